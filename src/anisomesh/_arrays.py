@@ -1,0 +1,33 @@
+"""Array aliases with shapes: the one place where they are defined.
+
+Letters: ``V`` points, ``F`` faces, ``E`` edges, ``S`` sites, ``P`` polygons, ``d`` dimension of the
+embedding. Geometry is float64, indices are int32 and -1 stands for "none". The aliases document shapes
+for the reader; type checkers see plain NumPy arrays.
+"""
+
+import numpy as np
+from jaxtyping import Bool, Float64, Int32
+
+Points = Float64[np.ndarray, "V 3"]
+Faces = Int32[np.ndarray, "F 3"]
+Edges = Int32[np.ndarray, "E 2"]
+FaceIndices = Int32[np.ndarray, "F 3"]
+EdgeIndices = Int32[np.ndarray, "E 2"]
+
+PointScalars = Float64[np.ndarray, "V"]
+PointVectors = Float64[np.ndarray, "V 3"]
+PointTensors = Float64[np.ndarray, "V 3 3"]
+FaceScalars = Float64[np.ndarray, "F"]
+FaceVectors = Float64[np.ndarray, "F 3"]
+PointLabels = Int32[np.ndarray, "V"]
+FaceLabels = Int32[np.ndarray, "F"]
+FaceMask = Bool[np.ndarray, "F"]
+PointMask = Bool[np.ndarray, "V"]
+
+EmbeddedPoints = Float64[np.ndarray, "V d"]
+Sites = Float64[np.ndarray, "S d"]
+SiteScalars = Float64[np.ndarray, "S"]
+
+Vector3 = Float64[np.ndarray, "3"]
+Floats = Float64[np.ndarray, "n"]
+Indices = Int32[np.ndarray, "n"]

@@ -1,0 +1,59 @@
+"""Elementary geometry of triangles: cross products, normals, the frame that everything is computed in."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+
+from anisomesh._arrays import Faces, FaceVectors, Points, PointVectors, Vector3
+
+
+def face_cross(points: Points, faces: Faces) -> FaceVectors:
+    """Return the cross product of two sides of each face (F, 3): normal times twice the area."""
+    a, b, c = points[faces[:, 0]], points[faces[:, 1]], points[faces[:, 2]]
+    return np.cross(b - a, c - a)
+
+
+def unit(vectors: npt.NDArray[np.float64]) -> npt.NDArray[np.float64]:
+    """Return the vectors (..., d) divided by their length; zero vectors stay zero."""
+    length = np.linalg.norm(vectors, axis=-1, keepdims=True)
+    return np.divide(vectors, length, out=np.zeros_like(vectors), where=length > 0)
+
+
+def point_normals(points: Points, faces: Faces) -> PointVectors:
+    """Return area-weighted unit normals (V, 3); zero at a point without faces."""
+    cross = face_cross(points, faces)
+    corners = faces.ravel()
+    normals = np.stack(
+        [np.bincount(corners, np.repeat(cross[:, axis], 3), minlength=len(points)) for axis in range(3)], axis=1
+    )
+    return unit(normals)
+
+
+@dataclass(frozen=True)
+class Frame:
+    """The similarity between model units and the frame of computation.
+
+    Everything is computed on a copy centred at the bounding-box centre with bounding-box diagonal 1, so that
+    tolerances and curvature limits mean the same on every model.
+    """
+
+    centre: Vector3
+    scale: float
+
+    def to_unit(self, points: npt.NDArray[Any]) -> npt.NDArray[np.float64]:
+        """Map points (n, 3) from model units to the frame of computation."""
+        return np.asarray((points - self.centre) / self.scale)
+
+    def to_model(self, points: npt.NDArray[Any]) -> npt.NDArray[np.float64]:
+        """Map points (n, 3) back to model units."""
+        return np.asarray(points * self.scale + self.centre)
+
+
+def unit_frame(points: Points) -> Frame:
+    """Return the frame in which these points (V, 3) have bounding-box diagonal 1 and centre 0."""
+    low, high = points.min(axis=0), points.max(axis=0)
+    return Frame(centre=0.5 * (low + high), scale=float(np.linalg.norm(high - low)) or 1.0)
