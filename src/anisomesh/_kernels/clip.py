@@ -1,0 +1,298 @@
+"""The restricted Voronoi diagram on one facet: the lower envelope of planes over a triangle.
+
+Squared distances from site i to the corners of a facet form ``W_i``; on the facet, with barycentric
+coordinates l, ``|y - x_i|^2 - |y - x_j|^2 = l . (W_i - W_j)``, so a cell restricted to the facet is a convex
+polygon in l and the dimension of the embedding enters only in the table W. A polygon is clipped by the
+bisectors with the neighbours in order of distance until the security radius (Levy and Bonneel 2012) proves
+that no further site can reach it; the sites behind its bisector edges are visited next.
+
+Polygon vertices carry an a-priori error bound, so that most signs are decided in floating point and the rest
+exactly (see predicates). A polygon edge carries a label: -1 - c for the side of the facet opposite corner c,
+otherwise the local slot of the site behind the bisector. Edge k runs from vertex k to vertex k + 1, counter-
+clockwise in the facet.
+"""
+
+from typing import NamedTuple
+
+import numpy as np
+from numba import njit
+
+from .predicates import corner_side, edge_side, interior_side
+
+OK = 0
+LIST_TOO_SHORT = -1  # a neighbour list ended before the security radius
+BUFFER_TOO_SMALL = -2  # more polygons, vertices or candidate sites on a facet than the workspace holds
+NO_OWNER = -3  # the start site of a facet is not near it
+
+_UNIT_ROUNDOFF = 1.1102230246251565e-16
+_SLOP = 1e-9  # relative inflation of the security radius, far above its rounding error
+
+
+class Facets(NamedTuple):
+    """The embedded surface: arrays over facets and points."""
+
+    faces: np.ndarray  # (F, 3) int32
+    points: np.ndarray  # (V, d)
+    side2: np.ndarray  # (F, 3) squared length of the side opposite each corner
+    area: np.ndarray  # (F,) area in the embedding
+    normal: np.ndarray  # (F, 3) unit normal of the facet in 3-D
+
+
+class Sites(NamedTuple):
+    """Sites and their neighbour lists, sorted by distance."""
+
+    positions: np.ndarray  # (S, d)
+    start: np.ndarray  # (S + 1,) first neighbour of each site
+    neighbours: np.ndarray  # (N,) int32
+    distance2: np.ndarray  # (N,) squared distances
+    complete: np.ndarray  # (S,) radius within which the list of a site holds every other site
+
+
+class Workspace(NamedTuple):
+    """Buffers of one thread."""
+
+    clock: np.ndarray  # (1,) int64, counts the facets clipped
+    stamp: np.ndarray  # (S,) int64, when this site was last given a slot
+    slot: np.ndarray  # (S,)
+    candidate: np.ndarray  # (C,) site of each slot
+    table: np.ndarray  # (C, 3) squared distances to the corners of the facet
+    queued: np.ndarray  # (C,) whether the polygon of the slot is done or waits
+    queue: np.ndarray  # (C,)
+    polygon_slot: np.ndarray  # (C,) slot of every finished polygon
+    polygon_start: np.ndarray  # (C + 1,) its first vertex
+    label: np.ndarray  # (B,) label of the edge that leaves each vertex
+    vertex: np.ndarray  # (B, 3) barycentric coordinates
+    work: np.ndarray  # (2, M, 7) the polygon being clipped, before and after a cut
+
+
+# columns of Workspace.work after the three barycentric coordinates
+_ERROR = 3  # bound on the error of the coordinates
+_SQUARE = 4  # squared distance to the site
+_LABEL = 5  # label of the edge that leaves the vertex
+_VALUE = 6  # form of the clipping bisector
+
+
+@njit(cache=True, nogil=True, forceinline=True)
+def _fill_row(table, row, site, positions, points, a, b, c):
+    """Write the squared distances of a site to the three corners."""
+    wa = 0.0
+    wb = 0.0
+    wc = 0.0
+    for k in range(positions.shape[1]):
+        x = positions[site, k]
+        ta = points[a, k] - x
+        tb = points[b, k] - x
+        tc = points[c, k] - x
+        wa += ta * ta
+        wb += tb * tb
+        wc += tc * tc
+    table[row, 0] = wa
+    table[row, 1] = wb
+    table[row, 2] = wc
+
+
+@njit(cache=True, nogil=True)
+def _exact_side(table, candidate, i, before, after, j):
+    """Return the exact side (1 or -1) of the vertex between two labelled edges of cell i against site j."""
+    site = candidate
+    w = table
+    if before < 0 and after < 0:
+        return corner_side(w[i], w[j], site[i], site[j], 5 + before + after)
+    if before < 0 or after < 0:
+        side = -1 - min(before, after)
+        k = max(before, after)
+        return edge_side(w[i], w[k], w[j], site[i], site[k], site[j], (side + 1) % 3, (side + 2) % 3)
+    return interior_side(w[i], w[before], w[after], w[j], site[i], site[before], site[after], site[j])
+
+
+@njit(cache=True, nogil=True, forceinline=True)
+def _intersect(work, source, p, q, m, size):
+    """Write the point of the edge p q where the form vanishes, and a bound on its error, as vertex m.
+
+    With t the true and t' the computed parameter, both in [0, 1], and beta the error of the two values,
+    |t - t'| <= 3 beta / (|value_p - value_q| - 2 beta): the new point is as good as its two parents plus that
+    share of their distance, and never worse than the whole distance.
+    """
+    parents = max(work[source, p, _ERROR], work[source, q, _ERROR])
+    beta = (parents + 8.0 * _UNIT_ROUNDOFF) * size
+    gap = work[source, p, _VALUE] - work[source, q, _VALUE]
+    t = min(max(work[source, p, _VALUE] / gap, 0.0), 1.0) if gap != 0.0 else 0.5
+    spread = abs(gap) - 2.0 * beta
+    share = min(1.0, 3.0 * beta / spread) if spread > 0.0 else 1.0
+    length = 0.0
+    for c in range(3):
+        step = work[source, q, c] - work[source, p, c]
+        work[1 - source, m, c] = work[source, p, c] + t * step
+        length = max(length, abs(step))
+    work[1 - source, m, _ERROR] = parents + share * (length + 2.0 * parents) + 4.0 * _UNIT_ROUNDOFF
+
+
+@njit(cache=True, nogil=True, forceinline=True)
+def _classify(work, table, candidate, source, n, i, j, fa, fb, fc):
+    """Decide which vertices site j takes; return their number and the first of them in cyclic order."""
+    size = abs(fa) + abs(fb) + abs(fc)
+    first = 0
+    n_lost = 0
+    before = False
+    zero = False
+    for k in range(n):
+        v = work[source, k, 0] * fa + work[source, k, 1] * fb + work[source, k, 2] * fc
+        work[source, k, _VALUE] = v
+        if abs(v) > (work[source, k, _ERROR] + 8.0 * _UNIT_ROUNDOFF) * size:
+            lost = v < 0.0
+        else:
+            label_before = int(work[source, k - 1 if k > 0 else n - 1, _LABEL])
+            lost = _exact_side(table, candidate, i, label_before, int(work[source, k, _LABEL]), j) < 0
+        if k == 0:
+            zero = lost
+        elif lost and not before:
+            first = k
+        if lost:
+            n_lost += 1
+        before = lost
+    if zero and not before:
+        first = 0
+    return n_lost, first
+
+
+@njit(cache=True, nogil=True, forceinline=True)
+def _cut(work, source, n, n_lost, first, j, size):
+    """Write the polygon without its lost vertices into the other buffer; return its vertex count."""
+    target = 1 - source
+    entry = first - 1 if first > 0 else n - 1
+    last = first + n_lost - 1
+    if last >= n:
+        last -= n
+    leave = last + 1 if last + 1 < n else 0
+    k = leave
+    kept = n - n_lost
+    for m in range(kept):
+        for c in range(_VALUE):
+            work[target, m, c] = work[source, k, c]
+        k = k + 1 if k + 1 < n else 0
+    _intersect(work, source, entry, first, kept, size)
+    work[target, kept, _LABEL] = j
+    _intersect(work, source, leave, last, kept + 1, size)
+    work[target, kept + 1, _LABEL] = work[source, last, _LABEL]
+    return kept + 2
+
+
+@njit(cache=True, nogil=True, forceinline=True)
+def _measure(work, source, first, n, wa, wb, wc, sa, sb, sc):
+    """Compute the squared distances of the vertices from ``first`` on; return the largest of all."""
+    for m in range(first, n):
+        la = work[source, m, 0]
+        lb = work[source, m, 1]
+        lc = work[source, m, 2]
+        work[source, m, _SQUARE] = la * wa + lb * wb + lc * wc - (lb * lc * sa + lc * la * sb + la * lb * sc)
+    largest = 0.0
+    for m in range(n):
+        largest = max(largest, work[source, m, _SQUARE])
+    return largest
+
+
+@njit(cache=True, nogil=True, forceinline=True)
+def _whole_facet(work, wa, wb, wc):
+    """Start the polygon as the whole facet."""
+    for k in range(3):
+        for c in range(4):
+            work[0, k, c] = 1.0 if c == k else 0.0
+        work[0, k, _LABEL] = -1 - (k + 2) % 3
+    work[0, 0, _SQUARE] = wa
+    work[0, 1, _SQUARE] = wb
+    work[0, 2, _SQUARE] = wc
+
+
+@njit(cache=True, nogil=True)
+def clip_facet(facet, owner, facets, sites, ws):
+    """Write the polygons of all cells on a facet into the workspace.
+
+    ``owner`` is a site likely to own a part of the facet. Returns the number of polygons and -1, or a
+    negative status and the site concerned.
+    """
+    positions, start, neighbours, distance2, complete = sites
+    clock, stamp, slot, candidate, table, queued, queue, polygon_slot, polygon_start, out_label, out_vertex, work = ws
+    a, b, c = facets.faces[facet, 0], facets.faces[facet, 1], facets.faces[facet, 2]
+    sa, sb, sc = facets.side2[facet, 0], facets.side2[facet, 1], facets.side2[facet, 2]
+    points = facets.points
+    clock[0] += 1
+    now = clock[0]
+    _fill_row(table, 0, owner, positions, points, a, b, c)
+    stamp[owner] = now
+    slot[owner] = 0
+    candidate[0] = owner
+    queued[0] = 1
+    queue[0] = 0
+    n_slots = 1
+    head = 0
+    tail = 1
+    n_polygons = 0
+    n_vertices = 0
+    while head < tail:
+        i = queue[head]
+        head += 1
+        site = candidate[i]
+        wa, wb, wc = table[i, 0], table[i, 1], table[i, 2]
+        _whole_facet(work, wa, wb, wc)
+        radius2 = max(wa, wb, wc)
+        n = 3
+        source = 0
+        rival = -1
+        for k in range(start[site], start[site + 1]):
+            if distance2[k] > 4.0 * radius2 * (1.0 + _SLOP):
+                break
+            other = neighbours[k]
+            if stamp[other] == now:
+                j = slot[other]
+            else:
+                if n_slots >= candidate.shape[0]:
+                    return BUFFER_TOO_SMALL, site
+                j = n_slots
+                n_slots += 1
+                stamp[other] = now
+                slot[other] = j
+                candidate[j] = other
+                queued[j] = 0
+                _fill_row(table, j, other, positions, points, a, b, c)
+            fa, fb, fc = table[j, 0] - wa, table[j, 1] - wb, table[j, 2] - wc
+            if fa > 0.0 and fb > 0.0 and fc > 0.0:
+                continue
+            n_lost, first = _classify(work, table, candidate, source, n, i, j, fa, fb, fc)
+            if n_lost == 0:
+                continue
+            if n_lost == n:
+                n = 0
+                rival = j
+                break
+            if n + 2 > work.shape[1]:
+                return BUFFER_TOO_SMALL, site
+            n = _cut(work, source, n, n_lost, first, j, abs(fa) + abs(fb) + abs(fc))
+            source = 1 - source
+            radius2 = _measure(work, source, n - 2, n, wa, wb, wc, sa, sb, sc)
+        if n == 0:
+            # only the start site can have no part of the facet; whatever took the last of it is tried next
+            if n_polygons > 0 or queued[rival]:
+                return NO_OWNER, site
+            queued[rival] = 1
+            queue[tail] = rival
+            tail += 1
+            continue
+        if 2.0 * np.sqrt(radius2) * (1.0 + _SLOP) > complete[site]:
+            return LIST_TOO_SHORT, site
+        if n_vertices + n > out_label.shape[0]:
+            return BUFFER_TOO_SMALL, site
+        polygon_slot[n_polygons] = i
+        polygon_start[n_polygons] = n_vertices
+        n_polygons += 1
+        for k in range(n):
+            label = int(work[source, k, _LABEL])
+            out_label[n_vertices] = label
+            for m in range(3):
+                out_vertex[n_vertices, m] = work[source, k, m]
+            n_vertices += 1
+            if label >= 0 and not queued[label]:
+                queued[label] = 1
+                queue[tail] = label
+                tail += 1
+    polygon_start[n_polygons] = n_vertices
+    return n_polygons, -1

@@ -1,0 +1,61 @@
+"""Writing the restricted Voronoi diagram in symbolic form, chunk by chunk."""
+
+from numba import njit
+
+from .clip import clip_facet
+
+
+@njit(cache=True, nogil=True)
+def count_chunk(chunk, owners, facets, sites, ws, problems):
+    """Return the numbers of polygons, polygon vertices and problems on a chunk of facets.
+
+    A facet that cannot be clipped is written into ``problems`` (facet, site, status).
+    """
+    polygons = 0
+    vertices = 0
+    n_problems = 0
+    for facet in chunk:
+        n, problem = clip_facet(facet, owners[facet], facets, sites, ws)
+        if n < 0:
+            problems[n_problems, 0] = facet
+            problems[n_problems, 1] = problem
+            problems[n_problems, 2] = n
+            n_problems += 1
+            continue
+        owners[facet] = ws.candidate[ws.polygon_slot[0]]
+        polygons += n
+        vertices += ws.polygon_start[n]
+    return polygons, vertices, n_problems
+
+
+@njit(cache=True, nogil=True)
+def write_chunk(chunk, owners, facets, sites, ws, facet_of, site_of, size, label, vertex):
+    """Write the polygons of a chunk of facets: per polygon facet, site, vertex count; per vertex the rest.
+
+    Edge labels are sites, or -1 - c for the side of the facet opposite corner c. Every polygon starts at a
+    canonical vertex, that with the lowest label, so that the output does not depend on the owners.
+    """
+    p = 0
+    v = 0
+    for facet in chunk:
+        n, _ = clip_facet(facet, owners[facet], facets, sites, ws)
+        for m in range(n):
+            first = ws.polygon_start[m]
+            count = ws.polygon_start[m + 1] - first
+            facet_of[p] = facet
+            site_of[p] = ws.candidate[ws.polygon_slot[m]]
+            size[p] = count
+            p += 1
+            lowest = 0
+            for k in range(count):
+                slot = ws.label[first + k]
+                if slot >= 0:
+                    ws.label[first + k] = ws.candidate[slot]
+                if ws.label[first + k] < ws.label[first + lowest]:
+                    lowest = k
+            for k in range(count):
+                source = first + (k + lowest) % count
+                label[v] = ws.label[source]
+                for c in range(3):
+                    vertex[v, c] = ws.vertex[source, c]
+                v += 1

@@ -1,0 +1,168 @@
+"""Energy and gradient of the normal-metric CVT, accumulated over the cells on a chunk of facets.
+
+Per polygon P of site i on a facet (area A, barycentric moments M1, M2, normal N, h_i = N . (v_a - x_i)):
+
+    E      = area_f (W_i . M1 - sum |side|^2 M2) + (s^2 - 1) A h_i^2
+    dE/dx_i = 2 A x_i - 2 sum_c M1_c v_c - 2 (s^2 - 1) A h_i [N; 0]
+              + sum over bisector edges (i, j), length L, midpoint m:
+                (s^2 - 1) (h_i^2 - h_j^2) L / |P_T (x_j - x_i)| (m - x_i)
+
+The last sum is the motion of the cell boundary: the normal-metric part of the energy jumps across a bisector,
+because the diagram is that of the Euclidean distance. |P_T (x_j - x_i)| is half the in-plane gradient of the
+form l . (W_j - W_i). Every vector is a combination of x_i, the corners and N, so the dimension of the
+embedding enters once per polygon.
+"""
+
+import numpy as np
+from numba import njit
+
+from .clip import BUFFER_TOO_SMALL, clip_facet
+
+
+@njit(cache=True, nogil=True, forceinline=True)
+def _moments(vertex, start, end, first):
+    """Write area fraction, M1 (3) and M2 (ab, bc, ca by opposite corner: bc, ca, ab) of a polygon."""
+    area = 0.0
+    ma = mb = mc = 0.0
+    mbc = mca = mab = 0.0
+    pa, pb, pc = vertex[start, 0], vertex[start, 1], vertex[start, 2]
+    for k in range(start + 1, end - 1):
+        qa, qb, qc = vertex[k, 0], vertex[k, 1], vertex[k, 2]
+        ra, rb, rc = vertex[k + 1, 0], vertex[k + 1, 1], vertex[k + 1, 2]
+        t = (qa - pa) * (rb - pb) - (qb - pb) * (ra - pa)
+        sa, sb, sc = pa + qa + ra, pb + qb + rb, pc + qc + rc
+        area += t
+        ma += t * sa
+        mb += t * sb
+        mc += t * sc
+        mbc += t * (pb * pc + qb * qc + rb * rc + sb * sc)
+        mca += t * (pc * pa + qc * qa + rc * ra + sc * sa)
+        mab += t * (pa * pb + qa * qb + ra * rb + sa * sb)
+    first[0] = area
+    first[1] = ma / 3.0
+    first[2] = mb / 3.0
+    first[3] = mc / 3.0
+    first[4] = mbc / 12.0
+    first[5] = mca / 12.0
+    first[6] = mab / 12.0
+
+
+@njit(cache=True, nogil=True, forceinline=True)
+def _height(facets, facet, positions, site):
+    """Return h = N . (v_a - x) of a site over a facet."""
+    corner = facets.faces[facet, 0]
+    h = 0.0
+    for k in range(3):
+        h += facets.normal[facet, k] * (facets.points[corner, k] - positions[site, k])
+    return h
+
+
+@njit(cache=True, nogil=True, forceinline=True)
+def _boundary_motion(ws, k, following, i, j, jump, side2, area):
+    """Return the coefficient of (m - x_i) for the bisector edge k to following between slots i and j."""
+    da = ws.vertex[following, 0] - ws.vertex[k, 0]
+    db = ws.vertex[following, 1] - ws.vertex[k, 1]
+    dc = ws.vertex[following, 2] - ws.vertex[k, 2]
+    length2 = -(db * dc * side2[0] + dc * da * side2[1] + da * db * side2[2])
+    p = (ws.table[j, 1] - ws.table[i, 1]) - (ws.table[j, 0] - ws.table[i, 0])
+    q = (ws.table[j, 2] - ws.table[i, 2]) - (ws.table[j, 0] - ws.table[i, 0])
+    # 4 area^2 |gradient|^2 from p, q along the sides ab (side2[2]) and ac (side2[1])
+    slope2 = p * p * side2[1] - p * q * (side2[1] + side2[2] - side2[0]) + q * q * side2[2]
+    if length2 <= 0.0 or slope2 <= 0.0:
+        return 0.0
+    return jump * 4.0 * area * np.sqrt(length2 / slope2)
+
+
+@njit(cache=True, nogil=True)
+def integrate_chunk(chunk, owners, facets, sites, ws, sharpness, row_of, touched, accumulated, problems):
+    """Integrate over a chunk of facets, given by index.
+
+    Writes, for each site met, its index into ``touched`` and its gradient (d) and mass into a row of
+    ``accumulated`` (one row for each polygon at most); ``row_of`` (S,) holds -1 between calls, ``owners`` (F,)
+    are the start sites, updated. A facet that cannot be clipped is skipped and written into ``problems``
+    (facet, site, status). Returns the energy, the number of sites met and the number of problems.
+    """
+    dimension = sites.positions.shape[1]
+    extra = sharpness * sharpness - 1.0
+    energy = 0.0
+    n_touched = 0
+    moments = np.empty(7)
+    corner_weight = np.empty(3)
+    n_problems = 0
+    for facet in chunk:
+        n_polygons, problem = clip_facet(facet, owners[facet], facets, sites, ws)
+        if n_polygons < 0 or n_touched + n_polygons > touched.shape[0]:
+            problems[n_problems, 0] = facet
+            problems[n_problems, 1] = problem
+            problems[n_problems, 2] = n_polygons if n_polygons < 0 else BUFFER_TOO_SMALL
+            n_problems += 1
+            continue
+        owners[facet] = ws.candidate[ws.polygon_slot[0]]
+        area = facets.area[facet]
+        side2 = facets.side2[facet]
+        for p in range(n_polygons):
+            i = ws.polygon_slot[p]
+            site = ws.candidate[i]
+            start = ws.polygon_start[p]
+            stop = ws.polygon_start[p + 1]
+            row = row_of[site]
+            if row < 0:
+                row = n_touched
+                row_of[site] = row
+                touched[row] = site
+                for k in range(dimension + 1):
+                    accumulated[row, k] = 0.0
+                n_touched += 1
+            _moments(ws.vertex, start, stop, moments)
+            mass = area * moments[0]
+            energy += area * (
+                ws.table[i, 0] * moments[1]
+                + ws.table[i, 1] * moments[2]
+                + ws.table[i, 2] * moments[3]
+                - side2[0] * moments[4]
+                - side2[1] * moments[5]
+                - side2[2] * moments[6]
+            )
+            own_weight = 2.0 * mass
+            for c in range(3):
+                corner_weight[c] = -2.0 * area * moments[1 + c]
+            if extra > 0.0:
+                h = _height(facets, facet, sites.positions, site)
+                energy += extra * mass * h * h
+                for k in range(3):
+                    accumulated[row, k] -= 2.0 * extra * mass * h * facets.normal[facet, k]
+                for k in range(start, stop):
+                    j = ws.label[k]
+                    if j < 0:
+                        continue
+                    h_j = _height(facets, facet, sites.positions, ws.candidate[j])
+                    following = k + 1 if k + 1 < stop else start
+                    weight = _boundary_motion(ws, k, following, i, j, extra * (h * h - h_j * h_j), side2, area)
+                    own_weight -= weight
+                    for c in range(3):
+                        corner_weight[c] += 0.5 * weight * (ws.vertex[k, c] + ws.vertex[following, c])
+            a = facets.faces[facet, 0]
+            b = facets.faces[facet, 1]
+            c = facets.faces[facet, 2]
+            for k in range(dimension):
+                accumulated[row, k] += (
+                    own_weight * sites.positions[site, k]
+                    + corner_weight[0] * facets.points[a, k]
+                    + corner_weight[1] * facets.points[b, k]
+                    + corner_weight[2] * facets.points[c, k]
+                )
+            accumulated[row, dimension] += mass
+    for k in range(n_touched):
+        row_of[touched[k]] = -1
+    return energy, n_touched, n_problems
+
+
+@njit(cache=True, nogil=True)
+def gather(touched, n_touched, accumulated, gradient, mass):
+    """Add the rows of one chunk to the gradient (S, d) and the mass (S,)."""
+    dimension = gradient.shape[1]
+    for row in range(n_touched):
+        site = touched[row]
+        for k in range(dimension):
+            gradient[site, k] += accumulated[row, k]
+        mass[site] += accumulated[row, dimension]

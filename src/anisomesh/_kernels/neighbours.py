@@ -1,0 +1,28 @@
+"""Keeping neighbour lists sorted while the sites move (lists after Verlet 1967)."""
+
+from numba import njit
+
+
+@njit(cache=True, nogil=True)
+def refresh_lists(begin, end, positions, start, neighbours, distance2):
+    """Recompute the squared distances of the lists of sites begin..end-1 and sort each list by them.
+
+    Insertion sort: the lists are almost sorted from the last time. Ties keep the order of the site index, so
+    the result does not depend on the history.
+    """
+    dimension = positions.shape[1]
+    for site in range(begin, end):
+        first = start[site]
+        for k in range(first, start[site + 1]):
+            other = neighbours[k]
+            d2 = 0.0
+            for c in range(dimension):
+                t = positions[site, c] - positions[other, c]
+                d2 += t * t
+            m = k
+            while m > first and (distance2[m - 1] > d2 or (distance2[m - 1] == d2 and neighbours[m - 1] > other)):
+                distance2[m] = distance2[m - 1]
+                neighbours[m] = neighbours[m - 1]
+                m -= 1
+            distance2[m] = d2
+            neighbours[m] = other

@@ -1,0 +1,129 @@
+"""The restricted Voronoi diagram as data: polygons with symbolic vertices."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cached_property
+from typing import Any, NamedTuple
+
+import numpy as np
+import numpy.typing as npt
+
+from anisomesh._arrays import EmbeddedPoints, Faces, Sites
+
+Ints = npt.NDArray[np.int32]
+
+
+@dataclass(frozen=True, eq=False)
+class Diagram:
+    """Cells of the sites on every facet: P convex polygons with Q vertices in all.
+
+    Polygons are ordered by facet, then by site, their vertices counter-clockwise in the facet. Polygon ``p``
+    owns the vertices ``offset[p]`` to ``offset[p + 1] - 1``; edge ``k`` leads from vertex k to the next one.
+
+    Attributes
+    ----------
+    points, faces
+        The embedded surface: (V, d), and (F, 3) in the order that ``facet`` refers to.
+    sites
+        Positions (S, d).
+    facet, site
+        Facet and site of each polygon (P,).
+    offset
+        First vertex of each polygon (P + 1,).
+    label
+        What bounds each edge (Q,): the site behind a bisector, or -1 - c for the side of the facet opposite
+        corner c.
+    barycentric
+        Coordinates of the vertices in their facet (Q, 3).
+    """
+
+    points: EmbeddedPoints
+    faces: Faces
+    sites: Sites
+    facet: Ints
+    site: Ints
+    offset: npt.NDArray[np.int64]
+    label: Ints
+    barycentric: npt.NDArray[np.float64]
+
+    @cached_property
+    def polygon_of(self) -> Ints:
+        """Polygon of each vertex (Q,)."""
+        return np.repeat(np.arange(len(self.site), dtype=np.int32), np.diff(self.offset))
+
+    @cached_property
+    def previous(self) -> npt.NDArray[np.int64]:
+        """Vertex before each vertex in its polygon (Q,)."""
+        result = np.arange(-1, len(self.label) - 1)
+        result[self.offset[:-1]] = self.offset[1:] - 1
+        return result
+
+    @cached_property
+    def following(self) -> npt.NDArray[np.int64]:
+        """Vertex after each vertex in its polygon (Q,)."""
+        result = np.arange(1, len(self.label) + 1)
+        result[self.offset[1:] - 1] = self.offset[:-1]
+        return result
+
+    @cached_property
+    def positions(self) -> npt.NDArray[np.float64]:
+        """Embedded positions of the vertices (Q, d)."""
+        return self.at(self.facet[self.polygon_of], self.barycentric)
+
+    @cached_property
+    def fractions(self) -> npt.NDArray[np.float64]:
+        """Area of each polygon (P,) as a share of its facet."""
+        here, there = self.barycentric, self.barycentric[self.following]
+        cross = here[:, 0] * there[:, 1] - here[:, 1] * there[:, 0]
+        return np.asarray(np.bincount(self.polygon_of, cross, minlength=len(self.site)))
+
+    def at(self, facet: npt.NDArray[Any], barycentric: npt.NDArray[np.float64]) -> npt.NDArray[np.float64]:
+        """Return embedded positions (n, d) of points given by facet (n,) and barycentric coordinates (n, 3)."""
+        return np.asarray(np.einsum("nc,ncd->nd", barycentric, self.points[self.faces[facet]]))
+
+    def polygon_index(self, facet: npt.NDArray[Any], site: npt.NDArray[Any]) -> npt.NDArray[np.int64]:
+        """Return the polygon of each (facet, site) pair, -1 where the cell does not reach the facet."""
+        keys = self.facet.astype(np.int64) * len(self.sites) + self.site
+        wanted = np.asarray(facet, dtype=np.int64) * len(self.sites) + site
+        place = np.minimum(np.searchsorted(keys, wanted), len(keys) - 1)
+        return np.where(keys[place] == wanted, place, -1)
+
+
+class DiagramPart(NamedTuple):
+    """The polygons of some facets, as the kernel writes them."""
+
+    facet: Ints
+    site: Ints
+    size: Ints
+    label: Ints
+    barycentric: npt.NDArray[np.float64]
+
+    @classmethod
+    def empty(cls, n_polygons: int, n_vertices: int) -> DiagramPart:
+        """Return room for this many polygons and vertices."""
+        polygon = [np.empty(n_polygons, dtype=np.int32) for _ in range(3)]
+        return cls(*polygon, np.empty(n_vertices, dtype=np.int32), np.empty((n_vertices, 3)))
+
+
+def assemble(points: EmbeddedPoints, faces: Faces, sites: Sites, parts: list[DiagramPart]) -> Diagram:
+    """Return the diagram made of these parts, polygons in the order of facet and site."""
+    facet = np.concatenate([part.facet for part in parts])
+    site = np.concatenate([part.site for part in parts])
+    size = np.concatenate([part.size for part in parts])
+    label = np.concatenate([part.label for part in parts])
+    barycentric = np.concatenate([part.barycentric for part in parts])
+    order = np.lexsort((site, facet))
+    start = np.cumsum(size) - size
+    offset = np.concatenate([[0], np.cumsum(size[order])])
+    source = np.repeat(start[order] - offset[:-1], size[order]) + np.arange(len(label))
+    return Diagram(
+        points=points,
+        faces=faces,
+        sites=sites,
+        facet=facet[order],
+        site=site[order],
+        offset=offset,
+        label=label[source],
+        barycentric=barycentric[source],
+    )
