@@ -22,7 +22,8 @@ from .predicates import corner_side, edge_side, interior_side
 OK = 0
 LIST_TOO_SHORT = -1  # a neighbour list ended before the security radius
 BUFFER_TOO_SMALL = -2  # more polygons, vertices or candidate sites on a facet than the workspace holds
-NO_OWNER = -3  # the start site of a facet is not near it
+NO_OWNER = -3  # the start site of a facet has no part of it
+START_TOO_FAR = -4  # the list of the start site is too short: perhaps another site is nearer
 
 _UNIT_ROUNDOFF = 1.1102230246251565e-16
 _SLOP = 1e-9  # relative inflation of the security radius, far above its rounding error
@@ -63,6 +64,7 @@ class Workspace(NamedTuple):
     label: np.ndarray  # (B,) label of the edge that leaves each vertex
     vertex: np.ndarray  # (B, 3) barycentric coordinates
     work: np.ndarray  # (2, M, 7) the polygon being clipped, before and after a cut
+    needed: np.ndarray  # (S,) radius that a neighbour list should have had, 0 where it was long enough
 
 
 # columns of Workspace.work after the three barycentric coordinates
@@ -207,11 +209,11 @@ def _whole_facet(work, wa, wb, wc):
 def clip_facet(facet, owner, facets, sites, ws):
     """Write the polygons of all cells on a facet into the workspace.
 
-    ``owner`` is a site likely to own a part of the facet. Returns the number of polygons and -1, or a
-    negative status and the site concerned.
+    ``owner`` is a site likely to own a part of the facet. Returns the number of polygons or a negative status;
+    lists that are too short are noted in the workspace, all those on the facet at once.
     """
     positions, start, neighbours, distance2, complete = sites
-    clock, stamp, slot, candidate, table, queued, queue, polygon_slot, polygon_start, out_label, out_vertex, work = ws
+    clock, stamp, slot, candidate, table, queued, queue, polygon_slot, polygon_start, out_label, out_vertex, work, all_needed = ws
     a, b, c = facets.faces[facet, 0], facets.faces[facet, 1], facets.faces[facet, 2]
     sa, sb, sc = facets.side2[facet, 0], facets.side2[facet, 1], facets.side2[facet, 2]
     points = facets.points
@@ -228,6 +230,7 @@ def clip_facet(facet, owner, facets, sites, ws):
     tail = 1
     n_polygons = 0
     n_vertices = 0
+    short = False
     while head < tail:
         i = queue[head]
         head += 1
@@ -246,7 +249,7 @@ def clip_facet(facet, owner, facets, sites, ws):
                 j = slot[other]
             else:
                 if n_slots >= candidate.shape[0]:
-                    return BUFFER_TOO_SMALL, site
+                    return BUFFER_TOO_SMALL
                 j = n_slots
                 n_slots += 1
                 stamp[other] = now
@@ -265,22 +268,26 @@ def clip_facet(facet, owner, facets, sites, ws):
                 rival = j
                 break
             if n + 2 > work.shape[1]:
-                return BUFFER_TOO_SMALL, site
+                return BUFFER_TOO_SMALL
             n = _cut(work, source, n, n_lost, first, j, abs(fa) + abs(fb) + abs(fc))
             source = 1 - source
             radius2 = _measure(work, source, n - 2, n, wa, wb, wc, sa, sb, sc)
         if n == 0:
             # only the start site can have no part of the facet; whatever took the last of it is tried next
             if n_polygons > 0 or queued[rival]:
-                return NO_OWNER, site
+                return NO_OWNER
             queued[rival] = 1
             queue[tail] = rival
             tail += 1
             continue
-        if 2.0 * np.sqrt(radius2) * (1.0 + _SLOP) > complete[site]:
-            return LIST_TOO_SHORT, site
+        needed = 2.0 * np.sqrt(radius2) * (1.0 + _SLOP)
+        if needed > complete[site]:
+            all_needed[site] = max(all_needed[site], needed)
+            if n_polygons == 0:
+                return START_TOO_FAR
+            short = True
         if n_vertices + n > out_label.shape[0]:
-            return BUFFER_TOO_SMALL, site
+            return BUFFER_TOO_SMALL
         polygon_slot[n_polygons] = i
         polygon_start[n_polygons] = n_vertices
         n_polygons += 1
@@ -295,4 +302,4 @@ def clip_facet(facet, owner, facets, sites, ws):
                 queue[tail] = label
                 tail += 1
     polygon_start[n_polygons] = n_vertices
-    return n_polygons, -1
+    return LIST_TOO_SHORT if short else n_polygons

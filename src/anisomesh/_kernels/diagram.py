@@ -9,17 +9,16 @@ from .clip import clip_facet
 def count_chunk(chunk, owners, facets, sites, ws, problems):
     """Return the numbers of polygons, polygon vertices and problems on a chunk of facets.
 
-    A facet that cannot be clipped is written into ``problems`` (facet, site, status).
+    A facet that cannot be clipped is written into ``problems`` (facet, status).
     """
     polygons = 0
     vertices = 0
     n_problems = 0
     for facet in chunk:
-        n, problem = clip_facet(facet, owners[facet], facets, sites, ws)
+        n = clip_facet(facet, owners[facet], facets, sites, ws)
         if n < 0:
             problems[n_problems, 0] = facet
-            problems[n_problems, 1] = problem
-            problems[n_problems, 2] = n
+            problems[n_problems, 1] = n
             n_problems += 1
             continue
         owners[facet] = ws.candidate[ws.polygon_slot[0]]
@@ -38,7 +37,7 @@ def write_chunk(chunk, owners, facets, sites, ws, facet_of, site_of, size, label
     p = 0
     v = 0
     for facet in chunk:
-        n, _ = clip_facet(facet, owners[facet], facets, sites, ws)
+        n = clip_facet(facet, owners[facet], facets, sites, ws)
         for m in range(n):
             first = ws.polygon_start[m]
             count = ws.polygon_start[m + 1] - first

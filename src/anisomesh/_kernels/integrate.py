@@ -80,7 +80,7 @@ def integrate_chunk(chunk, owners, facets, sites, ws, sharpness, row_of, touched
     Writes, for each site met, its index into ``touched`` and its gradient (d) and mass into a row of
     ``accumulated`` (one row for each polygon at most); ``row_of`` (S,) holds -1 between calls, ``owners`` (F,)
     are the start sites, updated. A facet that cannot be clipped is skipped and written into ``problems``
-    (facet, site, status). Returns the energy, the number of sites met and the number of problems.
+    (facet, status). Returns the energy, the number of sites met and the number of problems.
     """
     dimension = sites.positions.shape[1]
     extra = sharpness * sharpness - 1.0
@@ -90,11 +90,10 @@ def integrate_chunk(chunk, owners, facets, sites, ws, sharpness, row_of, touched
     corner_weight = np.empty(3)
     n_problems = 0
     for facet in chunk:
-        n_polygons, problem = clip_facet(facet, owners[facet], facets, sites, ws)
+        n_polygons = clip_facet(facet, owners[facet], facets, sites, ws)
         if n_polygons < 0 or n_touched + n_polygons > touched.shape[0]:
             problems[n_problems, 0] = facet
-            problems[n_problems, 1] = problem
-            problems[n_problems, 2] = n_polygons if n_polygons < 0 else BUFFER_TOO_SMALL
+            problems[n_problems, 1] = n_polygons if n_polygons < 0 else BUFFER_TOO_SMALL
             n_problems += 1
             continue
         owners[facet] = ws.candidate[ws.polygon_slot[0]]

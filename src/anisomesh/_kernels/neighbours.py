@@ -1,17 +1,32 @@
 """Keeping neighbour lists sorted while the sites move (lists after Verlet 1967)."""
 
+import numpy as np
 from numba import njit
 
 
 @njit(cache=True, nogil=True)
-def refresh_lists(begin, end, positions, start, neighbours, distance2):
-    """Recompute the squared distances of the lists of sites begin..end-1 and sort each list by them.
+def displacements(positions, reference, moved):
+    """Write how far each site has moved from its reference; return the largest of these lengths."""
+    farthest = 0.0
+    for site in range(positions.shape[0]):
+        d2 = 0.0
+        for c in range(positions.shape[1]):
+            t = positions[site, c] - reference[site, c]
+            d2 += t * t
+        moved[site] = np.sqrt(d2)
+        farthest = max(farthest, moved[site])
+    return farthest
+
+
+@njit(cache=True, nogil=True)
+def refresh_lists(which, positions, start, neighbours, distance2):
+    """Recompute the squared distances of the lists of these sites and sort each list by them.
 
     Insertion sort: the lists are almost sorted from the last time. Ties keep the order of the site index, so
     the result does not depend on the history.
     """
     dimension = positions.shape[1]
-    for site in range(begin, end):
+    for site in which:
         first = start[site]
         for k in range(first, start[site + 1]):
             other = neighbours[k]

@@ -9,7 +9,6 @@ from typing import Any, TypeVar
 
 import numpy as np
 import numpy.typing as npt
-from scipy.spatial import cKDTree
 
 from anisomesh._arrays import EmbeddedPoints, Faces, SiteScalars, Sites
 from anisomesh._kernels import clip, diagram, integrate
@@ -23,7 +22,7 @@ _MAX_ROUNDS = 40
 
 _T = TypeVar("_T")
 Chunk = npt.NDArray[np.int32]  # facets
-Problems = npt.NDArray[np.int32]  # (n, 3): facet, site, status
+Problems = npt.NDArray[np.int32]  # (n, 2): facet, status
 Part = tuple[float, npt.NDArray[np.int32], npt.NDArray[np.float64]]
 
 
@@ -133,7 +132,7 @@ class RestrictedVoronoi:
         new = len(sites) != self._lists.n_sites
         self._table = self._lists.table(sites, self.threads)
         if new:
-            self._owners = _nearest(sites, self.points[self.faces[:, 0]])
+            self._owners = self._lists.nearest(self.points[self.faces[:, 0]], sites, self.threads)
             self._buffers = []
         while len(self._buffers) < self.threads:
             self._buffers.append(_Buffers(len(sites), sites.shape[1], self._size))
@@ -170,16 +169,21 @@ class RestrictedVoronoi:
         return results
 
     def _mend(self, problems: Problems, sites: Sites) -> None:
-        """Give facets a certain owner, lists more neighbours, workspaces more room."""
-        status = problems[:, 2]
+        """Give workspaces more room, facets the nearest owner, lists more neighbours."""
+        facet, status = problems.T
+        needed = np.max([buffers.workspace.needed for buffers in self._buffers], axis=0)
         if (status == clip.BUFFER_TOO_SMALL).any():
             self._size *= 2
             self._buffers = [_Buffers(len(sites), sites.shape[1], self._size) for _ in range(self.threads)]
-        astray = problems[status != clip.BUFFER_TOO_SMALL, 0]
-        self._owners[astray] = _nearest(sites, self.points[self.faces[astray, 0]])
-        short = np.unique(problems[status == clip.LIST_TOO_SHORT, 1])
-        if len(short):
-            self._table = self._lists.grow(sites, short, self.threads)
+        for buffers in self._buffers:
+            buffers.workspace.needed[:] = 0.0
+        astray = facet[(status == clip.NO_OWNER) | (status == clip.START_TOO_FAR)]
+        if len(astray):
+            old = self._owners[astray]
+            self._owners[astray] = self._lists.nearest(self.points[self.faces[astray, 0]], sites, self.threads)
+            needed[old[self._owners[astray] != old]] = 0.0
+        if needed.any():
+            self._table = self._lists.grow(sites, needed, self.threads)
 
 
 class _Buffers:
@@ -201,12 +205,13 @@ class _Buffers:
             label=np.zeros(vertices, dtype=np.int32),
             vertex=np.zeros((vertices, 3)),
             work=np.zeros((2, size, 7)),
+            needed=np.zeros(n_sites),
         )
         rows = min(n_sites, _CHUNK * size)
         self.row_of = np.full(n_sites, -1, dtype=np.int32)
         self.touched = np.zeros(rows, dtype=np.int32)
         self.accumulated = np.zeros((rows, dimension + 1))
-        self.problems = np.zeros((_CHUNK, 3), dtype=np.int32)
+        self.problems = np.zeros((_CHUNK, 2), dtype=np.int32)
 
 
 def facet_table(points: EmbeddedPoints, faces: Faces) -> clip.Facets:
@@ -220,10 +225,6 @@ def facet_table(points: EmbeddedPoints, faces: Faces) -> clip.Facets:
     area = 0.5 * np.sqrt(np.maximum(uu * vv - uv * uv, 0.0))
     normal = geometry.unit(np.cross(u[:, :3], v[:, :3]))
     return clip.Facets(faces=faces, points=points, side2=side2, area=area, normal=normal)
-
-
-def _nearest(sites: Sites, queries: npt.NDArray[np.float64]) -> npt.NDArray[np.int32]:
-    return np.asarray(cKDTree(sites).query(queries, workers=-1)[1], dtype=np.int32)
 
 
 def _spatial_order(centres: npt.NDArray[np.float64]) -> npt.NDArray[np.int64]:

@@ -1,0 +1,128 @@
+"""Connected components of restricted Voronoi cells, and which of them are no disks."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+import numpy.typing as npt
+from scipy.sparse import coo_array
+from scipy.sparse.csgraph import connected_components
+
+from anisomesh._arrays import FaceIndices
+from anisomesh.cvt.diagram import Diagram
+
+Ints = npt.NDArray[np.int32]
+
+
+@dataclass(frozen=True, eq=False)
+class Cells:
+    """Components of the cells of a diagram: C of them, ordered by site.
+
+    Attributes
+    ----------
+    of_polygon
+        Component of each polygon (P,).
+    site
+        Site of each component (C,).
+    alone
+        Whether the cell of its site has no other component (C,).
+    area
+        Area of each component (C,) in the embedding.
+    centroid
+        Centroid of each component (C, d).
+    euler
+        Euler characteristic of each component (C,); 1 for a disk.
+    """
+
+    of_polygon: Ints
+    site: Ints
+    alone: npt.NDArray[np.bool_]
+    area: npt.NDArray[np.float64]
+    centroid: npt.NDArray[np.float64]
+    euler: Ints
+
+
+def cells_of(diagram: Diagram, face_neighbours: FaceIndices, face_areas: npt.NDArray[np.float64]) -> Cells:
+    """Return the components of the cells.
+
+    Parameters
+    ----------
+    diagram
+        The restricted Voronoi diagram.
+    face_neighbours
+        Face across each side (F, 3), -1 at a boundary, for the faces of the diagram.
+    face_areas
+        Area of each face in the embedding (F,).
+
+    Notes
+    -----
+    Polygons of one site on two facets are joined when both reach the same mesh edge: the diagram on an edge
+    is decided from the edge alone, so both reach it or neither does.
+    """
+    on_side = np.flatnonzero(diagram.label < 0)
+    here = diagram.polygon_of[on_side]
+    across = face_neighbours[diagram.facet[here], -1 - diagram.label[on_side]]
+    inner = across >= 0
+    there = diagram.polygon_index(across[inner], diagram.site[here[inner]])
+    if (there < 0).any():
+        raise RuntimeError("two facets disagree about the diagram on their common edge; please report this mesh")
+    n = len(diagram.site)
+    graph = coo_array((np.ones(len(there), dtype=np.int8), (here[inner], there)), shape=(n, n))
+    _, labels = connected_components(graph, directed=False)
+    _, first, of_polygon = np.unique(labels, return_index=True, return_inverse=True)
+    rank = np.empty(len(first), dtype=np.int32)
+    order = np.lexsort((first, diagram.site[first]))
+    rank[order] = np.arange(len(first), dtype=np.int32)
+    of_polygon = rank[of_polygon]
+    site = diagram.site[first][order]
+    count = np.bincount(site, minlength=len(diagram.sites))
+    area, centroid = _mass(diagram, of_polygon, len(site), face_areas)
+    return Cells(
+        of_polygon=of_polygon,
+        site=site,
+        alone=count[site] == 1,
+        area=area,
+        centroid=centroid,
+        euler=_euler(diagram, of_polygon, len(site), face_neighbours),
+    )
+
+
+def _mass(
+    diagram: Diagram, of_polygon: Ints, n: int, face_areas: npt.NDArray[np.float64]
+) -> tuple[npt.NDArray[np.float64], npt.NDArray[np.float64]]:
+    """Return area (C,) and centroid (C, d) of each component."""
+    here, there = diagram.barycentric, diagram.barycentric[diagram.following]
+    cross = here[:, 0] * there[:, 1] - here[:, 1] * there[:, 0]
+    # triangles from barycentric corner c (0, 0, 1) to each edge: signed shares of area and of first moment
+    third = np.array([0.0, 0.0, 1.0])
+    moment = np.stack(
+        [
+            np.bincount(diagram.polygon_of, cross * (here[:, c] + there[:, c] + third[c]) / 3.0, len(diagram.site))
+            for c in range(3)
+        ],
+        axis=1,
+    )
+    weight = face_areas[diagram.facet]
+    area = np.bincount(of_polygon, diagram.fractions * weight, minlength=n)
+    moved = diagram.at(diagram.facet, moment) * weight[:, None]
+    total = np.stack([np.bincount(of_polygon, column, minlength=n) for column in moved.T], axis=1)
+    centroid = diagram.sites[diagram.site[np.unique(of_polygon, return_index=True)[1]]].copy()
+    np.divide(total, area[:, None], out=centroid, where=area[:, None] > 0.0)
+    return area, centroid
+
+
+def _euler(diagram: Diagram, of_polygon: Ints, n: int, face_neighbours: FaceIndices) -> Ints:
+    """Return the Euler characteristic of each component (C,), sharing what polygons have in common."""
+    facet = diagram.facet[diagram.polygon_of]
+    before, after = diagram.label[diagram.previous], diagram.label
+    shared_before = (before < 0) & (face_neighbours[facet, -1 - np.minimum(before, -1)] >= 0)
+    shared_after = (after < 0) & (face_neighbours[facet, -1 - np.minimum(after, -1)] >= 0)
+    valence = np.bincount(diagram.faces.ravel(), minlength=len(diagram.points))
+    corner = diagram.faces[facet, np.clip(5 + before + after, 0, 2)]
+    vertex = np.where(shared_before | shared_after, 0.5, 1.0)
+    vertex = np.where((before < 0) & (after < 0), 1.0 / valence[corner], vertex)
+    edge = np.where(shared_after, 0.5, 1.0)
+    component = of_polygon[diagram.polygon_of]
+    euler = np.bincount(component, vertex - edge, minlength=n) + np.bincount(of_polygon, minlength=n)
+    return np.rint(euler).astype(np.int32)
