@@ -1,0 +1,79 @@
+"""Anisotropic surface remeshing: a centroidal Voronoi tessellation of the mesh embedded in 8-D.
+
+>>> import anisomesh
+>>> result = anisomesh.remesh(anisomesh.sample(), n_vertices=1000)  # doctest: +SKIP
+>>> anisomesh.save(result.surface, "remeshed.ply")  # doctest: +SKIP
+
+The public names are resolved on first use, so that ``import anisomesh`` costs nothing.
+"""
+
+from __future__ import annotations
+
+import importlib
+from typing import TYPE_CHECKING, Any
+
+if TYPE_CHECKING:
+    from anisomesh.errors import AnisomeshError, MeshError, MeshFileError, MetricError, OptionError
+    from anisomesh.picture import side_by_side
+    from anisomesh.pipeline import RemeshOptions, RemeshResult, StepInfo, remesh, save_rvd
+    from anisomesh.surface.io import load, save
+    from anisomesh.surface.mesh import Surface
+    from anisomesh.surface.shapes import sample
+
+    __version__: str
+
+__all__ = [
+    "AnisomeshError",
+    "MeshError",
+    "MeshFileError",
+    "MetricError",
+    "OptionError",
+    "RemeshOptions",
+    "RemeshResult",
+    "StepInfo",
+    "Surface",
+    "__version__",
+    "load",
+    "remesh",
+    "sample",
+    "save",
+    "save_rvd",
+    "side_by_side",
+]
+
+_HOME = {
+    "AnisomeshError": "errors",
+    "MeshError": "errors",
+    "MeshFileError": "errors",
+    "MetricError": "errors",
+    "OptionError": "errors",
+    "RemeshOptions": "pipeline",
+    "RemeshResult": "pipeline",
+    "StepInfo": "pipeline",
+    "Surface": "surface.mesh",
+    "load": "surface.io",
+    "remesh": "pipeline",
+    "sample": "surface.shapes",
+    "save": "surface.io",
+    "save_rvd": "pipeline",
+    "side_by_side": "picture",
+}
+
+
+def __getattr__(name: str) -> Any:
+    """Import a public name from the module that defines it, once (PEP 562)."""
+    if name == "__version__":
+        from importlib.metadata import version
+
+        value: Any = version("anisomesh")
+    elif name in _HOME:
+        value = getattr(importlib.import_module(f"anisomesh.{_HOME[name]}"), name)
+    else:
+        raise AttributeError(f"module 'anisomesh' has no attribute {name!r}")
+    globals()[name] = value
+    return value
+
+
+def __dir__() -> list[str]:
+    """List the public names, resolved or not."""
+    return sorted({*globals(), *__all__})

@@ -77,14 +77,13 @@ def _boundary_motion(ws, k, following, i, j, jump, side2, area):
 def integrate_chunk(chunk, owners, facets, sites, ws, sharpness, row_of, touched, accumulated, problems):
     """Integrate over a chunk of facets, given by index.
 
-    Writes, for each site met, its index into ``touched`` and its gradient (d) and mass into a row of
+    Writes, for each site met, its index into ``touched`` and its gradient (d), mass and energy into a row of
     ``accumulated`` (one row for each polygon at most); ``row_of`` (S,) holds -1 between calls, ``owners`` (F,)
     are the start sites, updated. A facet that cannot be clipped is skipped and written into ``problems``
-    (facet, status). Returns the energy, the number of sites met and the number of problems.
+    (facet, status). Returns the number of sites met and the number of problems.
     """
     dimension = sites.positions.shape[1]
     extra = sharpness * sharpness - 1.0
-    energy = 0.0
     n_touched = 0
     moments = np.empty(7)
     corner_weight = np.empty(3)
@@ -109,12 +108,12 @@ def integrate_chunk(chunk, owners, facets, sites, ws, sharpness, row_of, touched
                 row = n_touched
                 row_of[site] = row
                 touched[row] = site
-                for k in range(dimension + 1):
+                for k in range(dimension + 2):
                     accumulated[row, k] = 0.0
                 n_touched += 1
             _moments(ws.vertex, start, stop, moments)
             mass = area * moments[0]
-            energy += area * (
+            energy = area * (
                 ws.table[i, 0] * moments[1]
                 + ws.table[i, 1] * moments[2]
                 + ws.table[i, 2] * moments[3]
@@ -151,17 +150,19 @@ def integrate_chunk(chunk, owners, facets, sites, ws, sharpness, row_of, touched
                     + corner_weight[2] * facets.points[c, k]
                 )
             accumulated[row, dimension] += mass
+            accumulated[row, dimension + 1] += energy
     for k in range(n_touched):
         row_of[touched[k]] = -1
-    return energy, n_touched, n_problems
+    return n_touched, n_problems
 
 
 @njit(cache=True, nogil=True)
-def gather(touched, n_touched, accumulated, gradient, mass):
-    """Add the rows of one chunk to the gradient (S, d) and the mass (S,)."""
+def gather(touched, accumulated, gradient, mass, energy):
+    """Add the rows of one chunk to the gradient (S, d), the mass (S,) and the energy (S,) of each cell."""
     dimension = gradient.shape[1]
-    for row in range(n_touched):
+    for row in range(len(touched)):
         site = touched[row]
         for k in range(dimension):
             gradient[site, k] += accumulated[row, k]
         mass[site] += accumulated[row, dimension]
+        energy[site] += accumulated[row, dimension + 1]

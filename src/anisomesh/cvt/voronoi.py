@@ -23,16 +23,17 @@ _MAX_ROUNDS = 40
 _T = TypeVar("_T")
 Chunk = npt.NDArray[np.int32]  # facets
 Problems = npt.NDArray[np.int32]  # (n, 2): facet, status
-Part = tuple[float, npt.NDArray[np.int32], npt.NDArray[np.float64]]
+Part = tuple[npt.NDArray[np.int32], npt.NDArray[np.float64]]
 
 
 @dataclass(frozen=True)
 class Evaluation:
-    """Energy (embedding units to the fourth), gradient (S, d) and mass (S,): the area of each cell."""
+    """Energy of each cell (S,) and in all (embedding units to the fourth), gradient (S, d), cell areas (S,)."""
 
     energy: float
     gradient: Sites
     mass: SiteScalars
+    cell_energy: SiteScalars
 
 
 class RestrictedVoronoi:
@@ -86,7 +87,7 @@ class RestrictedVoronoi:
         """
 
         def integrate_chunk(chunk: Chunk, buffers: _Buffers) -> tuple[Part, Problems]:
-            energy, n, n_problems = integrate.integrate_chunk(
+            n, n_problems = integrate.integrate_chunk(
                 chunk,
                 self._owners,
                 self.facets,
@@ -98,17 +99,14 @@ class RestrictedVoronoi:
                 buffers.accumulated,
                 buffers.problems,
             )
-            part = (energy, buffers.touched[:n].copy(), buffers.accumulated[:n].copy())
+            part = (buffers.touched[:n].copy(), buffers.accumulated[:n].copy())
             return part, buffers.problems[:n_problems].copy()
 
         self._prepare(sites)
-        gradient = np.zeros_like(sites)
-        mass = np.zeros(len(sites))
-        energy = 0.0
-        for part_energy, touched, accumulated in self._run(integrate_chunk, sites):
-            energy += part_energy
-            integrate.gather(touched, len(touched), accumulated, gradient, mass)
-        return Evaluation(energy, gradient, mass)
+        gradient, mass, energy = np.zeros_like(sites), np.zeros(len(sites)), np.zeros(len(sites))
+        for touched, accumulated in self._run(integrate_chunk, sites):
+            integrate.gather(touched, accumulated, gradient, mass, energy)
+        return Evaluation(float(energy.sum()), gradient, mass, energy)
 
     def diagram(self, sites: Sites) -> Diagram:
         """Return the diagram in symbolic form: polygons, their vertices and what bounds each edge."""
@@ -210,7 +208,7 @@ class _Buffers:
         rows = min(n_sites, _CHUNK * size)
         self.row_of = np.full(n_sites, -1, dtype=np.int32)
         self.touched = np.zeros(rows, dtype=np.int32)
-        self.accumulated = np.zeros((rows, dimension + 1))
+        self.accumulated = np.zeros((rows, dimension + 2))
         self.problems = np.zeros((_CHUNK, 2), dtype=np.int32)
 
 

@@ -1,0 +1,1 @@
+"""Euclidean embeddings in which the distances of a metric are straight lengths."""

@@ -1,0 +1,1 @@
+"""Measures of a remesh: shape of the triangles, validity, distance to the input."""

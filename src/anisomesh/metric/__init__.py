@@ -1,0 +1,1 @@
+"""Principal curvatures and the metric tensors made of them."""

@@ -4,8 +4,10 @@ from __future__ import annotations
 
 import numpy as np
 import numpy.typing as npt
+from scipy import sparse
+from scipy.sparse import csgraph
 
-from anisomesh._arrays import EdgeIndices, Edges, FaceIndices, Faces
+from anisomesh._arrays import EdgeIndices, Edges, FaceIndices, FaceLabels, Faces, Indices
 
 
 def half_edges(faces: Faces) -> npt.NDArray[np.int32]:
@@ -39,4 +41,153 @@ def face_neighbours(face_edges: FaceIndices, edge_faces: EdgeIndices) -> FaceInd
     """Return the face across the side opposite each corner (F, 3), -1 for none."""
     pairs = edge_faces[face_edges]
     own = np.arange(len(face_edges), dtype=np.int32)[:, None]
-    return np.where(pairs[:, :, 0] == own, pairs[:, :, 1], pairs[:, :, 0]).astype(np.int32)
+    across: FaceIndices = np.where(pairs[:, :, 0] == own, pairs[:, :, 1], pairs[:, :, 0]).astype(np.int32)
+    return across
+
+
+def side_pairs(faces: Faces) -> npt.NDArray[np.int64]:
+    """Return pairs (n, 2) of sides that lie on the same edge.
+
+    Sides are numbered as the rows of :func:`half_edges`. An edge with two faces gives one pair, an edge with
+    ``k`` faces a chain of ``k - 1`` pairs.
+    """
+    face_edges = edges_of(faces)[1].ravel()
+    order = np.argsort(face_edges, kind="stable")
+    same = face_edges[order[1:]] == face_edges[order[:-1]]
+    return np.stack([order[:-1][same], order[1:][same]], axis=1)
+
+
+def side_ends(sides: npt.NDArray[np.integer]) -> tuple[npt.NDArray[np.int64], npt.NDArray[np.int64]]:
+    """Return the corners (numbered ``3 f + c``) at which these sides start and end."""
+    sides = np.asarray(sides, dtype=np.int64)
+    face, corner = np.divmod(sides, 3)
+    return 3 * face + (corner + 1) % 3, 3 * face + (corner + 2) % 3
+
+
+def corner_fans(faces: Faces, pairs: npt.NDArray[np.int64]) -> tuple[int, npt.NDArray[np.int32]]:
+    """Group the corners of the faces into fans.
+
+    Parameters
+    ----------
+    faces
+        Point indices (F, 3).
+    pairs
+        Pairs (n, 2) of sides to glue, as from :func:`side_pairs`; the sides of a pair lie on the same edge, in
+        either direction.
+
+    Returns
+    -------
+    tuple
+        The number of fans and the fan of every corner (3F,). Two corners at the same point share a fan if one
+        can walk from one face to the other around that point, crossing glued sides only.
+    """
+    corners = faces.ravel()
+    start, end = side_ends(pairs)
+    same_way = corners[start[:, 0]] == corners[start[:, 1]]
+    rows = np.concatenate([start[:, 0], end[:, 0]])
+    columns = np.concatenate(
+        [np.where(same_way, start[:, 1], end[:, 1]), np.where(same_way, end[:, 1], start[:, 1])],
+    )
+    return _components(rows, columns, len(corners))
+
+
+def connected_components(faces: Faces, n_points: int) -> tuple[int, FaceLabels]:
+    """Return the number of components and the component of every face (F,); faces sharing a point connect."""
+    rows, columns = faces[:, [0, 0]].ravel(), faces[:, [1, 2]].ravel()
+    _, labels = _components(rows, columns, n_points)
+    kept, face_labels = np.unique(labels[faces[:, 0]], return_inverse=True)
+    return len(kept), face_labels.astype(np.int32)
+
+
+def euler_characteristic(faces: Faces) -> int:
+    """Return points - edges + faces, counting only the points that a face uses."""
+    return len(np.unique(faces)) - len(edges_of(faces)[0]) + len(faces)
+
+
+def count_nonmanifold_edges(faces: Faces) -> int:
+    """Return the number of edges with more than two faces."""
+    return int((np.bincount(edges_of(faces)[1].ravel()) > 2).sum())
+
+
+def nonmanifold_points(faces: Faces) -> Indices:
+    """Return the points whose faces do not form one fan.
+
+    These are the ends of edges with more than two faces, and points where several fans meet (two cones
+    touching at their tips).
+    """
+    edges, face_edges = edges_of(faces)
+    n_fans, fans = corner_fans(faces, side_pairs(faces))
+    point_of_fan = np.empty(n_fans, dtype=np.int64)
+    point_of_fan[fans] = faces.ravel()
+    bad = np.bincount(point_of_fan) > 1
+    bad[edges[np.bincount(face_edges.ravel()) > 2]] = True
+    return np.flatnonzero(bad).astype(np.int32)
+
+
+def count_nonmanifold_points(faces: Faces) -> int:
+    """Return the number of points whose faces do not form one fan."""
+    return len(nonmanifold_points(faces))
+
+
+def is_oriented(faces: Faces) -> bool:
+    """Return whether every edge with exactly two faces is used once in each direction."""
+    face_edges = edges_of(faces)[1].ravel()
+    sides = half_edges(faces)
+    upward = (sides[:, 0] < sides[:, 1]).astype(np.int64)
+    count = np.bincount(face_edges)
+    return bool((np.bincount(face_edges, upward)[count == 2] == 1).all())
+
+
+def boundary_loops(faces: Faces) -> list[Indices]:
+    """Return the boundary loops, each as its points in order, with the surface on the left.
+
+    Notes
+    -----
+    A boundary edge is an edge with one face. At a point where several fans meet a loop stays within its fan,
+    so that a point can occur in several loops or twice in one. On a surface that is not manifold a "loop" can
+    be an open chain, given without its last point; on one that is not oriented the direction is that of its first face.
+    """
+    edges_at = edges_of(faces)[1].ravel()
+    sides = np.flatnonzero(np.bincount(edges_at)[edges_at] == 1)
+    if len(sides) == 0:
+        return []
+    _, fans = corner_fans(faces, side_pairs(faces))
+    start, end = side_ends(sides)
+    walks = _walks(fans[start], fans[end])
+    ends = np.stack([faces.ravel()[start], faces.ravel()[end]], axis=1)
+    return [np.array([ends[side, way] for side, way in walk], dtype=np.int32) for walk in walks]
+
+
+def _walks(tails: npt.NDArray[np.int32], heads: npt.NDArray[np.int32]) -> list[list[tuple[int, int]]]:
+    """Split a graph into walks of (edge, 0 along or 1 against it), closed wherever every degree is even."""
+    at: dict[int, list[tuple[int, int]]] = {}
+    nodes = np.stack([tails, heads], axis=1).tolist()
+    for edge, (tail, head) in enumerate(nodes):
+        at.setdefault(head, []).insert(0, (edge, 1))
+        at.setdefault(tail, []).append((edge, 0))
+    odd = [node for node, leaving in at.items() if len(leaving) % 2]
+    used = [False] * len(nodes)
+    walks = []
+    for node in odd + tails.tolist():
+        walk: list[tuple[int, int]] = []
+        while True:
+            leaving = at[node]
+            while leaving and used[leaving[-1][0]]:
+                leaving.pop()
+            if not leaving:
+                break
+            edge, way = leaving.pop()
+            used[edge] = True
+            walk.append((edge, way))
+            node = nodes[edge][1 - way]
+        if walk:
+            walks.append(walk)
+    return walks
+
+
+def _components(
+    rows: npt.NDArray[np.integer], columns: npt.NDArray[np.integer], size: int
+) -> tuple[int, npt.NDArray[np.int32]]:
+    graph = sparse.coo_matrix((np.ones(len(rows), dtype=np.bool_), (rows, columns)), shape=(size, size))
+    count, labels = csgraph.connected_components(graph, directed=False)
+    return int(count), labels.astype(np.int32)

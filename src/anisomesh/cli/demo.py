@@ -1,0 +1,59 @@
+"""``anisomesh demo``: remesh a shape that the program makes itself, so that nothing has to be downloaded."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from anisomesh.cli.job import Outputs, run_remesh
+from anisomesh.cli.progress import progress
+from anisomesh.cli.report import summary
+from anisomesh.errors import AnisomeshError
+
+VERTICES = 2000
+
+
+def command(
+    out: Annotated[
+        Path, typer.Option("--out", "-o", metavar="DIR", help="Folder for the results; made if it is missing.")
+    ] = Path("anisomesh-demo"),
+    n_vertices: Annotated[
+        int, typer.Option("--vertices", "-n", min=4, help="Number of vertices of the result.")
+    ] = VERTICES,
+    threads: Annotated[int, typer.Option(min=1, help="Worker threads.")] = 2,
+    quiet: Annotated[bool, typer.Option("--quiet", "-q", help="No progress and no summary.")] = False,
+) -> None:
+    """Remesh a built-in sample: writes the input, the result, a report and a picture of both."""
+    from anisomesh.picture import require_renderer
+    from anisomesh.surface.io import save
+    from anisomesh.surface.shapes import DEFAULT_SAMPLE, sample
+
+    if out.exists() and not out.is_dir():
+        raise typer.BadParameter(f"{out} is a file; give the name of a folder")
+    out.mkdir(parents=True, exist_ok=True)
+    picture: Path | None = out / "side_by_side.png"
+    try:
+        require_renderer()
+    except AnisomeshError as error:
+        picture = None
+        typer.echo(f"anisomesh: no picture: {error}", err=True)
+    outputs = Outputs(mesh=out / "remeshed.ply", report=out / "report.json", picture=picture)
+    outputs.check()
+    surface = sample(DEFAULT_SAMPLE)
+    save(surface, out / "input.ply")
+    with progress(quiet) as display:
+        result, facts = run_remesh(
+            surface,
+            display,
+            name=f"sample {DEFAULT_SAMPLE!r}",
+            load_seconds=0.0,
+            n_vertices=n_vertices,
+            threads=threads,
+        )
+        outputs.write(result, facts, display)
+    if not quiet:
+        paths = [out / "input.ply", *outputs.paths]
+        typer.echo(f"sample {DEFAULT_SAMPLE!r}: {surface.n_points:,} vertices, {surface.n_faces:,} faces")
+        typer.echo(summary(facts, paths, result.prepare_report.lines()))

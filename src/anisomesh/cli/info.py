@@ -1,0 +1,98 @@
+"""``anisomesh info``: what a mesh file contains and what preparing it would do."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any
+
+import typer
+
+from anisomesh.cli.job import read
+from anisomesh.cli.report import as_json, counted, describe_validity, table
+
+if TYPE_CHECKING:
+    from anisomesh.surface.mesh import Surface
+
+
+def command(
+    source: Annotated[Path, typer.Argument(metavar="IN", help="Mesh file: OBJ, OFF, PLY, STL, GLB, VTU, ...")],
+    json_: Annotated[bool, typer.Option("--json", help="Print the facts as JSON and nothing else.")] = False,
+) -> None:
+    """Describe a mesh: size, topology, defects, and what would be repaired before remeshing."""
+    facts = describe(read(source)[0]) | {"file": str(source)}
+    typer.echo(as_json(facts) if json_ else _text(facts))
+
+
+def describe(surface: Surface) -> dict[str, Any]:
+    """Return the facts about a surface, JSON-able.
+
+    Notes
+    -----
+    The genus is given where it is defined, on an oriented manifold: the sum over the components, with every
+    boundary loop closed by a disk.
+    """
+    from anisomesh.surface.prepare import prepare
+
+    validity = _validity(surface)
+    prepared = prepare(surface)
+    low, high = surface.points.min(axis=0), surface.points.max(axis=0)
+    lengths = surface.edge_lengths
+    return {
+        "points": surface.n_points,
+        "faces": surface.n_faces,
+        "edges": len(surface.edges),
+        "bounding_box": {"min": low.tolist(), "max": high.tolist(), "diagonal": surface.diagonal},
+        "area": surface.area,
+        "edge_length": {"min": float(lengths.min()), "mean": float(lengths.mean()), "max": float(lengths.max())},
+        "validity": validity,
+        "genus": _genus(validity),
+        "prepare": {
+            "changes": prepared.report.lines(),
+            "points": prepared.surface.n_points,
+            "faces": prepared.surface.n_faces,
+        },
+    }
+
+
+def _validity(surface: Surface) -> dict[str, Any]:
+    from anisomesh.surface import topology
+
+    faces = surface.faces
+    nonmanifold_edges = topology.count_nonmanifold_edges(faces)
+    loops = len(topology.boundary_loops(faces))
+    return {
+        "closed": loops == 0,
+        "boundary_loops": loops,
+        "components": topology.connected_components(faces, surface.n_points)[0],
+        "euler": topology.euler_characteristic(faces),
+        "nonmanifold_edges": nonmanifold_edges,
+        "nonmanifold_vertices": topology.count_nonmanifold_points(faces),
+        "oriented": topology.is_oriented(faces),
+    }
+
+
+def _genus(validity: dict[str, Any]) -> int | None:
+    if validity["nonmanifold_edges"] or validity["nonmanifold_vertices"] or not validity["oriented"]:
+        return None
+    twice = 2 * validity["components"] - validity["boundary_loops"] - validity["euler"]
+    return int(twice // 2)
+
+
+def _text(facts: dict[str, Any]) -> str:
+    box, lengths, prepare = facts["bounding_box"], facts["edge_length"], facts["prepare"]
+    corners = " to ".join(f"({', '.join(f'{x:.6g}' for x in box[end])})" for end in ("min", "max"))
+    changes = prepare["changes"] or ["nothing to repair"]
+    rows = [
+        ("points", f"{facts['points']:,}"),
+        ("faces", f"{facts['faces']:,}"),
+        ("bounding box", f"{corners}, diagonal {box['diagonal']:.6g}"),
+        ("area", f"{facts['area']:.6g}"),
+        ("edge length", f"{lengths['min']:.4g} to {lengths['max']:.4g}, mean {lengths['mean']:.4g}"),
+        ("surface", describe_validity(facts["validity"])),
+        ("genus", "not defined" if facts["genus"] is None else str(facts["genus"])),
+        *(("to prepare", change) for change in changes),
+    ]
+    if prepare["changes"]:
+        size = f"{counted(prepare['points'], 'point')}, {counted(prepare['faces'], 'face')}"
+        rows.append(("prepared", size))
+    return f"{facts['file']}\n{table(rows)}"

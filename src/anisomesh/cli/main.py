@@ -1,0 +1,100 @@
+"""Entry point of the ``anisomesh`` command: subcommands, exit codes, errors in one line.
+
+Exit codes: 0 done, 1 anisomesh refused or failed (one line on stderr), 2 wrong usage, 130 interrupted.
+"""
+
+from __future__ import annotations
+
+import os
+import sys
+from typing import Annotated
+
+import typer
+
+from anisomesh.cli import demo, info, remesh
+from anisomesh.errors import AnisomeshError
+
+# The base class of all errors in the arguments; it is public only through this subclass.
+_UsageError: type[Exception] = typer.BadParameter.__bases__[0]
+
+app = typer.Typer(
+    name="anisomesh",
+    add_completion=False,
+    pretty_exceptions_enable=False,
+    context_settings={"help_option_names": ["-h", "--help"]},
+)
+app.command("remesh")(remesh.command)
+app.command("info")(info.command)
+app.command("demo")(demo.command)
+
+
+def _print_version(wanted: bool) -> None:
+    if wanted:
+        from importlib.metadata import version
+
+        typer.echo(f"anisomesh {version('anisomesh')}")
+        raise typer.Exit
+
+
+@app.callback(invoke_without_command=True)
+def _main(
+    context: typer.Context,
+    version: Annotated[
+        bool, typer.Option("--version", help="Print the version and exit.", callback=_print_version, is_eager=True)
+    ] = False,
+) -> None:
+    """Turn any triangle mesh into an anisotropic one with about as many vertices as you ask for."""
+    if context.invoked_subcommand is None:
+        typer.echo(context.get_help())
+        raise typer.Exit(2)
+
+
+def run() -> None:
+    """Run the command line with the arguments of the process and exit with its status."""
+    sys.exit(main(sys.argv[1:]))
+
+
+def main(arguments: list[str]) -> int:
+    """Run the command line and return its exit code.
+
+    Parameters
+    ----------
+    arguments
+        The words after the program's name.
+
+    Returns
+    -------
+    int
+        0 done, 1 an error that anisomesh reports in one line on stderr, 2 wrong usage, 130 interrupted.
+    """
+    try:
+        status = app(args=arguments, prog_name="anisomesh", standalone_mode=False) or 0
+        sys.stdout.flush()
+    except _UsageError as error:
+        return _fail(_usage_message(error), 2)
+    except AnisomeshError as error:
+        return _fail(str(error), 1)
+    except BrokenPipeError:
+        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
+        return 1
+    except OSError as error:
+        return _fail(f"{error.filename}: {error.strerror}" if error.filename else str(error), 1)
+    except MemoryError:
+        return _fail("out of memory; ask for fewer vertices or use a machine with more memory", 1)
+    except (KeyboardInterrupt, typer.Abort):
+        status = 130
+    if status == 130:
+        print("anisomesh: interrupted", file=sys.stderr)
+    return int(status)
+
+
+def _fail(message: str, status: int) -> int:
+    print(f"anisomesh: error: {' '.join(message.split())}", file=sys.stderr)
+    return status
+
+
+def _usage_message(error: Exception) -> str:
+    context = getattr(error, "ctx", None)
+    command = context.command_path if context else "anisomesh"
+    message = error.format_message() if hasattr(error, "format_message") else str(error)
+    return f"{message.rstrip('.')}; see '{command} --help'"

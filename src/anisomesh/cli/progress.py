@@ -1,0 +1,132 @@
+"""Progress on stderr: a live bar on a terminal, a few plain lines elsewhere."""
+
+from __future__ import annotations
+
+import sys
+import time
+from contextlib import AbstractContextManager
+from types import TracebackType
+from typing import TYPE_CHECKING
+
+if TYPE_CHECKING:
+    from anisomesh.pipeline import StepInfo
+
+_LABELS = {
+    "prepare": "preparing the mesh",
+    "metric": "estimating curvature",
+    "embed": "embedding",
+    "cvt": "moving the sites",
+    "dual": "building the triangles",
+}
+_SECONDS_BETWEEN_LINES = 5.0
+
+
+class Display(AbstractContextManager["Display"]):
+    """Progress that says nothing; the base of those that do."""
+
+    def __call__(self, step: StepInfo) -> None:
+        """Ignore the step."""
+
+    def note(self, text: str) -> None:
+        """Ignore the remark."""
+
+    def __exit__(self, kind: type[BaseException] | None, error: BaseException | None, at: TracebackType | None) -> None:
+        """Do nothing."""
+
+
+class _Lines(Display):
+    """One line when a stage starts and then one every few seconds."""
+
+    def __init__(self) -> None:
+        self._stage = ""
+        self._last = 0.0
+
+    def __call__(self, step: StepInfo) -> None:
+        """Print the step if it starts a stage or if the last line is some time ago."""
+        now = time.monotonic()
+        if step.stage == self._stage and now - self._last < _SECONDS_BETWEEN_LINES:
+            return
+        self._stage, self._last = step.stage, now
+        self.note(f"{_LABELS.get(step.stage, step.stage)}{_details(step)}")
+
+    def note(self, text: str) -> None:
+        """Print a remark."""
+        print(text, file=sys.stderr, flush=True)
+
+
+class _Bar(Display):
+    """A live bar that disappears at the end."""
+
+    def __init__(self) -> None:
+        from rich.console import Console
+        from rich.progress import BarColumn, Progress, TextColumn, TimeElapsedColumn
+
+        self._progress = Progress(
+            TextColumn("{task.description:<22}"),
+            BarColumn(bar_width=30),
+            TextColumn("{task.fields[details]}"),
+            TimeElapsedColumn(),
+            console=Console(stderr=True),
+            transient=True,
+        )
+        self._task = self._progress.add_task("starting", total=None, details="")
+
+    def __enter__(self) -> _Bar:
+        """Show the bar."""
+        self._progress.start()
+        return self
+
+    def __exit__(self, kind: type[BaseException] | None, error: BaseException | None, at: TracebackType | None) -> None:
+        """Take the bar away."""
+        self._progress.stop()
+
+    def __call__(self, step: StepInfo) -> None:
+        """Move the bar."""
+        self._progress.update(
+            self._task,
+            description=_LABELS.get(step.stage, step.stage),
+            completed=step.iteration,
+            total=step.total or None,
+            details=_details(step).lstrip(),
+        )
+
+    def note(self, text: str) -> None:
+        """Print a remark above the bar."""
+        self._progress.console.print(text, style="dim", markup=False, highlight=False)
+
+
+def _details(step: StepInfo) -> str:
+    parts = [f"{step.iteration}/{step.total}"] if step.total > 1 else []
+    if step.energy is not None:
+        parts.append(f"energy {step.energy:.4g}")
+    if step.message:
+        parts.append(step.message)
+    return "  " + "  ".join(parts) if parts else ""
+
+
+def progress(quiet: bool) -> Display:
+    """Return the progress display that suits stderr: nothing, a live bar or plain lines.
+
+    Parameters
+    ----------
+    quiet
+        True for no progress at all.
+
+    Returns
+    -------
+    context manager
+        Call it with a :class:`~anisomesh.pipeline.StepInfo` for every step; ``note(text)`` prints a remark.
+    """
+    if quiet:
+        return Display()
+    return _Bar() if sys.stderr.isatty() else _Lines()
+
+
+def announce_compilation(display: Display) -> None:
+    """Say so if the numeric kernels are about to be compiled, which happens once per installation."""
+    try:
+        from anisomesh._kernels.warmup import kernels_cached
+    except ImportError:
+        return
+    if not kernels_cached():
+        display.note("compiling the numeric kernels (once per installation, up to a minute) ...")

@@ -1,0 +1,93 @@
+"""What the commands print and write about a result: the summary, the JSON report."""
+
+from __future__ import annotations
+
+import json
+import math
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+
+STAGES = ("load", "prepare", "metric", "embed", "cvt", "dual")
+
+
+def as_json(report: dict[str, Any]) -> str:
+    """Return strict JSON: numbers that are not finite become null."""
+    return json.dumps(_finite(report), indent=2, allow_nan=False)
+
+
+def _finite(value: Any) -> Any:
+    if isinstance(value, dict):
+        return {key: _finite(item) for key, item in value.items()}
+    if isinstance(value, list | tuple):
+        return [_finite(item) for item in value]
+    if isinstance(value, float) and not math.isfinite(value):
+        return None
+    return value
+
+
+def write_json(report: dict[str, Any], path: Path) -> None:
+    """Write the report as JSON, in full or not at all."""
+    from anisomesh.surface.files import atomic_path
+
+    with atomic_path(path) as temporary:
+        Path(temporary).write_text(as_json(report) + "\n", encoding="utf-8")
+
+
+def counted(count: int, singular: str, plural: str | None = None) -> str:
+    """Return a number with its noun, ``1 face`` or ``1,200 faces``."""
+    return f"{count:,} {singular if count == 1 else plural or singular + 's'}"
+
+
+def table(rows: Sequence[tuple[str, str]]) -> str:
+    """Return two aligned columns, one row per line."""
+    width = max(len(name) for name, _ in rows)
+    return "\n".join(f"  {name:<{width}}  {text}" for name, text in rows)
+
+
+def summary(report: dict[str, Any], written: Sequence[Path], notes: Sequence[str]) -> str:
+    """Return the readable summary of a remesh.
+
+    Parameters
+    ----------
+    report
+        What :meth:`anisomesh.pipeline.RemeshResult.report` returns.
+    written
+        The files that were written, in order.
+    notes
+        What preparing the input changed, one line each.
+    """
+    seconds, stretch = report["seconds"], report["stretch"]
+    stages = ", ".join(f"{stage} {seconds[stage]:.2f}" for stage in STAGES if stage in seconds)
+    energy = "" if report["energy"] is None else f", energy {report['energy']:.4g}"
+    rows = [
+        ("vertices", f"{report['vertices']:,} (asked for {report['vertices_asked']:,})"),
+        ("faces", f"{report['faces']:,}"),
+        ("surface", describe_validity(report["validity"])),
+        ("stretch", f"mean {stretch['mean']:.2f}, largest {stretch['max']:.2f} (1 = equilateral)"),
+        ("optimiser", f"{report['status']} after {counted(report['iterations'], 'iteration')}{energy}"),
+        ("seconds", f"{seconds['total']:.2f} ({stages})"),
+        *(("prepared", note) for note in notes),
+        *(("warning", text) for text in report["warnings"]),
+        *(("wrote", str(path)) for path in written),
+    ]
+    return table(rows)
+
+
+def describe_validity(validity: dict[str, Any]) -> str:
+    """Return the validity of a surface in words: closed or open, parts, topology, defects."""
+    edges, vertices = validity["nonmanifold_edges"], validity["nonmanifold_vertices"]
+    euler_input = validity.get("euler_input", validity["euler"])
+    parts = [
+        "closed" if validity["closed"] else counted(validity["boundary_loops"], "boundary loop"),
+        counted(validity["components"], "component"),
+        f"Euler {validity['euler']}" + (f" (input {euler_input})" if euler_input != validity["euler"] else ""),
+        "manifold" if not edges and not vertices else "",
+        counted(edges, "non-manifold edge") if edges else "",
+        counted(vertices, "non-manifold vertex", "non-manifold vertices") if vertices else "",
+        "" if validity["oriented"] else "not consistently oriented",
+        counted(validity["flipped"], "flipped triangle") if validity.get("flipped") else "",
+    ]
+    return ", ".join(part for part in parts if part)

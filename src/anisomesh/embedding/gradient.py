@@ -1,0 +1,104 @@
+"""Gradients on triangles in their own orthonormal frames, and 2x2 algebra in closed form."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+import numpy.typing as npt
+from scipy import sparse
+
+from anisomesh._arrays import FaceMask, FaceScalars, PointTensors
+from anisomesh.surface.geometry import unit
+from anisomesh.surface.mesh import Surface
+
+_FLAT = 1e-10
+
+FaceFrames = npt.NDArray[np.float64]
+FaceTensors = npt.NDArray[np.float64]
+
+
+@dataclass(frozen=True, eq=False)
+class FaceGradient:
+    """The gradient of piecewise linear functions.
+
+    Attributes
+    ----------
+    operator
+        Sparse (2F, V): rows ``2 f`` and ``2 f + 1`` give the two components of the gradient in the frame of face f.
+    areas
+        Areas (F,), zero for faces that are too flat to have a gradient.
+    frames
+        Orthonormal vectors (F, 2, 3) in the plane of each face; zero for flat faces.
+    solid
+        Which faces have a gradient (F,).
+    """
+
+    operator: sparse.csr_matrix
+    areas: FaceScalars
+    frames: FaceFrames
+    solid: FaceMask
+
+
+def solid_faces(surface: Surface) -> FaceMask:
+    """Return which faces (F,) have a height above 1e-10 of their longest side."""
+    longest = surface.edge_lengths[surface.face_edges].max(axis=1)
+    return np.asarray(2.0 * surface.face_areas > _FLAT * longest**2)
+
+
+def face_frames(surface: Surface) -> FaceFrames:
+    """Return two orthonormal vectors (F, 2, 3) in the plane of each face, the first along its first side.
+
+    They are zero for faces without a plane.
+    """
+    first = unit(surface.points[surface.faces[:, 1]] - surface.points[surface.faces[:, 0]])
+    frames = np.stack([first, np.cross(surface.face_normals, first)], axis=1)
+    frames[~solid_faces(surface)] = 0.0
+    return frames
+
+
+def face_gradient(surface: Surface) -> FaceGradient:
+    """Return the gradient operator of piecewise linear functions on the faces of a surface.
+
+    Notes
+    -----
+    The gradient of the hat function of a corner is the normal times the opposite side, over twice the area. A flat
+    face gets zero rows, so it neither constrains anything nor makes NaN.
+    """
+    frames, solid = face_frames(surface), solid_faces(surface)
+    points, faces = surface.points, surface.faces
+    sides = np.stack([points[faces[:, (c + 2) % 3]] - points[faces[:, (c + 1) % 3]] for c in range(3)], axis=1)
+    across = np.cross(surface.face_normals[:, None, :], sides)
+    double = np.where(solid, 2.0 * surface.face_areas, np.inf)
+    hats = np.einsum("fkx,fcx->fkc", frames, across) / double[:, None, None]
+    columns = np.repeat(faces, 2, axis=0).ravel()
+    starts = np.arange(0, 6 * surface.n_faces + 1, 3)
+    operator = sparse.csr_matrix((hats.ravel(), columns, starts), shape=(2 * surface.n_faces, surface.n_points))
+    return FaceGradient(operator, np.where(solid, surface.face_areas, 0.0), frames, solid)
+
+
+def face_tensors(surface: Surface, tensors: PointTensors, frames: FaceFrames) -> FaceTensors:
+    """Return the mean over the corners of tensors (V, 3, 3), restricted to the face planes, (F, 2, 2)."""
+    mean = tensors[surface.faces].mean(axis=1)
+    return frames @ mean @ frames.transpose(0, 2, 1)
+
+
+def larger_eigenvalue(tensors: FaceTensors) -> FaceScalars:
+    """Return the larger eigenvalue (F,) of symmetric 2x2 tensors."""
+    half_difference = 0.5 * (tensors[:, 0, 0] - tensors[:, 1, 1])
+    return 0.5 * (tensors[:, 0, 0] + tensors[:, 1, 1]) + np.hypot(half_difference, tensors[:, 0, 1])
+
+
+def eigen_2x2(tensors: FaceTensors) -> tuple[npt.NDArray[np.float64], FaceTensors]:
+    """Return the eigenvalues (F, 2), larger first, and the eigenvectors as columns (F, 2, 2) of symmetric tensors.
+
+    Notes
+    -----
+    The angle of the eigenvector is half the angle of (xx - yy, 2 xy), which loses nothing when the eigenvalues
+    nearly agree.
+    """
+    angle = 0.5 * np.arctan2(2.0 * tensors[:, 0, 1], tensors[:, 0, 0] - tensors[:, 1, 1])
+    cosine, sine = np.cos(angle), np.sin(angle)
+    vectors = np.stack([np.stack([cosine, -sine], axis=1), np.stack([sine, cosine], axis=1)], axis=1)
+    larger = larger_eigenvalue(tensors)
+    return np.stack([larger, tensors[:, 0, 0] + tensors[:, 1, 1] - larger], axis=1), vectors

@@ -1,0 +1,96 @@
+"""Shape of triangles measured in the metric."""
+
+from __future__ import annotations
+
+import igl
+import numpy as np
+import numpy.typing as npt
+
+from anisomesh._arrays import Faces, FaceScalars, Points, PointTensors
+from anisomesh.errors import MetricError
+from anisomesh.surface.mesh import Surface
+
+
+def anisotropic_quality(points: Points, faces: Faces, roots: PointTensors) -> FaceScalars:
+    """Return the quality G of each triangle in the metric, (F,): 1 for an equilateral one, 0 for a flat one.
+
+    Parameters
+    ----------
+    points, faces
+        The triangles.
+    roots
+        Symmetric square roots Q of the metric at the points (V, 3, 3).
+
+    Notes
+    -----
+    G = 2 sqrt(3) S / (p h) with area S, half perimeter p and longest side h of the triangle after it is mapped by
+    the mean of Q over its corners. In the paper's Heron formula s must be (a + b + c) / 2; the area is taken from
+    the cross product here, which is as exact and does not cancel.
+
+    References
+    ----------
+    NASM, section 4.1 (G_avg is the mean of these).
+    """
+    mean = roots[faces].mean(axis=1)
+    corners = points[faces]
+    mapped = np.einsum("fij,fcj->fci", mean, corners - corners[:, :1])
+    sides = mapped[:, [2, 0, 1]] - mapped[:, [1, 2, 0]]
+    lengths = np.sqrt(np.einsum("fci,fci->fc", sides, sides))
+    area = 0.5 * np.linalg.norm(np.cross(sides[:, 1], sides[:, 2]), axis=1)
+    denominator = 0.5 * lengths.sum(axis=1) * lengths.max(axis=1)
+    return np.divide(2.0 * np.sqrt(3.0) * area, denominator, out=np.zeros_like(area), where=denominator > 0.0)
+
+
+def transfer_metric_roots(reference: Surface, roots: PointTensors, query_points: Points) -> PointTensors:
+    """Return the metric roots at points (n, 3) near a surface, (n, 3, 3).
+
+    Parameters
+    ----------
+    reference
+        The surface on which the metric is given.
+    roots
+        Symmetric square roots Q of the metric at its points (V, 3, 3).
+    query_points
+        Where Q is wanted; each takes it from the closest point of the surface, by linear interpolation over the
+        facet there.
+
+    Raises
+    ------
+    MetricError
+        If there is not one root per point of the surface.
+    """
+    if roots.shape != (reference.n_points, 3, 3):
+        raise MetricError(f"roots has shape {roots.shape}; expected ({reference.n_points}, 3, 3)")
+    facet, weights = closest_points(reference, query_points)
+    return np.einsum("nc,ncij->nij", weights, roots[reference.faces[facet]])
+
+
+def closest_points(surface: Surface, query_points: Points) -> tuple[npt.NDArray[np.int64], npt.NDArray[np.float64]]:
+    """Return the facet (n,) and the barycentric coordinates in it (n, 3) of the closest point to each query."""
+    faces = surface.faces.astype(np.int64)
+    _, facet, closest = igl.point_mesh_squared_distance(
+        np.asarray(query_points, dtype=np.float64), surface.points, faces
+    )
+    facet = facet.astype(np.int64)
+    return facet, _barycentric(surface.points[surface.faces[facet]], closest)
+
+
+def _barycentric(corners: npt.NDArray[np.float64], points: Points) -> npt.NDArray[np.float64]:
+    """Return barycentric coordinates (n, 3) of points of triangles (n, 3, 3); on a flat one, along its longest side."""
+    sides = corners[:, [2, 0, 1]] - corners[:, [1, 2, 0]]
+    normal = np.cross(sides[:, 1], sides[:, 2])
+    squared = np.einsum("nx,nx->n", normal, normal)
+    longest_squared = np.einsum("ncx,ncx->nc", sides, sides)
+    to_corners = corners - points[:, None, :]
+    parts = np.cross(to_corners[:, [1, 2, 0]], to_corners[:, [2, 0, 1]])
+    weights = np.einsum("ncx,nx->nc", parts, normal)
+    flat = squared <= 1e-20 * longest_squared.max(axis=1) ** 2
+    weights = np.maximum(np.where(flat[:, None], 0.0, weights), 0.0)
+    rows = np.flatnonzero(flat)
+    side = np.argmax(longest_squared[rows], axis=1)
+    start, end = (side + 1) % 3, (side + 2) % 3
+    along = np.einsum("nx,nx->n", points[rows] - corners[rows, start], sides[rows, side])
+    length = longest_squared[rows, side]
+    share = np.clip(np.divide(along, length, out=np.zeros_like(along), where=length > 0.0), 0.0, 1.0)
+    weights[rows, start], weights[rows, end] = 1.0 - share, share
+    return np.asarray(weights / weights.sum(axis=1, keepdims=True))

@@ -1,0 +1,164 @@
+"""Principal curvatures and directions at the points of a mesh."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import igl
+import numpy as np
+import numpy.typing as npt
+from scipy import sparse
+
+from anisomesh._arrays import Faces, PointMask, PointVectors
+from anisomesh.errors import OptionError
+from anisomesh.metric.tangent import tangent_frames, unit_normals
+from anisomesh.surface.geometry import unit
+from anisomesh.surface.mesh import Surface
+from anisomesh.surface.topology import connected_components
+
+_UNKNOWNS_AND_POINT = 6
+_RADIUS_THAT_REACHES_SIX = 5
+_TANGENT = 0.1
+_FLAT = 1e-3
+
+PointPairs = npt.NDArray[np.float64]
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Curvature:
+    """Principal curvatures at the points.
+
+    Attributes
+    ----------
+    values
+        Signed curvatures (V, 2) in 1/length, the one of smaller magnitude first; positive where the surface
+        bends away from its normal (a sphere with outward normals).
+    directions
+        Unit tangent vectors (V, 2, 3) in the same order; their signs are arbitrary.
+    trusted
+        False (V,) where the neighbourhood was too small or too degenerate for a fit.
+    """
+
+    values: npt.NDArray[np.float64]
+    directions: npt.NDArray[np.float64]
+    trusted: PointMask
+
+
+def principal_curvatures(surface: Surface, *, radius: int = 5) -> Curvature:
+    """Return the principal curvatures from quadrics fitted to the neighbourhoods.
+
+    Parameters
+    ----------
+    surface
+        Any triangle mesh; it need not be manifold, and points without faces are allowed.
+    radius
+        Size of the neighbourhood in rings of edges, at least 2.
+
+    Raises
+    ------
+    OptionError
+        If the radius is below 2.
+
+    Notes
+    -----
+    libigl fits a quadric over the ``radius``-ring; its error falls with the square of the edge length. It
+    needs six points in every neighbourhood and ends the process when one has fewer, so it only sees faces with
+    three different corners, in components of six points or more, and with radius 5 (which reaches six points
+    in any such component) where a smaller one does not reach them. Elsewhere, and where the fit is not finite,
+    the shape operator is integrated from the normal curvatures of the edges at the point (Taubin), and
+    ``trusted`` is False. Points without faces have curvature 0. The fit gives no direction where a mesh is flat;
+    the rough estimate must then agree for the point to be trusted. Directions are projected to the plane of the
+    point normal. About 0.1 s for 6,000 points.
+
+    References
+    ----------
+    NASM, section 3.1. Panozzo, Puppo, Rocca, "Efficient multi-scale curvature and crease estimation", 2010.
+    Taubin, "Estimating the tensor of curvature of a surface from a polyhedral approximation", ICCV 1995.
+    """
+    if radius < 2:
+        raise OptionError(f"radius of the curvature fit is {radius}; expected at least 2 rings of edges")
+    normals = unit_normals(surface)
+    values, steepest = _fitted(surface, radius, normals)
+    fitted = np.isfinite(values).all(axis=1) & surface.point_normals.any(axis=1)
+    clear = fitted & steepest.any(axis=1)
+    trusted = clear
+    if not clear.all():
+        rough_values, rough_steepest = _integrated(surface, normals)
+        trusted = clear | (fitted & (np.abs(rough_values[:, 1]) * surface.diagonal < _FLAT))
+        values = np.where(clear[:, None], values, rough_values)
+        steepest = np.where(clear[:, None], steepest, rough_steepest)
+    return Curvature(
+        values=values, directions=np.stack([np.cross(normals, steepest), steepest], axis=1), trusted=trusted
+    )
+
+
+def _fitted(surface: Surface, radius: int, normals: PointVectors) -> tuple[PointPairs, PointVectors]:
+    """Return the curvatures sorted by magnitude (NaN without a fit) and the direction of the larger one, or zero."""
+    values = np.full((surface.n_points, 2), np.nan)
+    steepest = np.full((surface.n_points, 3), np.nan)
+    for faces, rings in _fit_groups(surface, radius):
+        used, local = np.unique(faces, return_inverse=True)
+        along_1, along_2, k1, k2, _ = igl.principal_curvature(
+            surface.points[used], local.reshape(-1, 3).astype(np.int64), rings, True
+        )
+        second = np.abs(k2) > np.abs(k1)
+        values[used] = np.where(second[:, None], np.stack([k1, k2], axis=1), np.stack([k2, k1], axis=1))
+        steepest[used] = np.where(second[:, None], along_2, along_1)
+    steepest = steepest - np.einsum("vx,vx->v", steepest, normals)[:, None] * normals
+    clear = np.isfinite(values).all(axis=1) & (np.linalg.norm(steepest, axis=1) > _TANGENT)
+    return values, unit(np.where(clear[:, None], steepest, 0.0))
+
+
+def _fit_groups(surface: Surface, radius: int) -> list[tuple[Faces, int]]:
+    """Split the faces that libigl may see into groups of components, each with the radius to use there."""
+    faces = surface.faces
+    faces = faces[(faces != np.roll(faces, 1, axis=1)).all(axis=1)]
+    if len(faces) == 0:
+        return []
+    count, face_label = connected_components(faces, surface.n_points)
+    label = np.full(surface.n_points, -1)
+    label[faces] = face_label[:, None]
+    large = np.bincount(label[label >= 0], minlength=count) >= _UNKNOWNS_AND_POINT
+    if radius >= _RADIUS_THAT_REACHES_SIX:
+        groups = [(large, radius)]
+    else:
+        starved = np.zeros(count, dtype=np.bool_)
+        starved[label[(label >= 0) & (_ring_sizes(surface, radius) < _UNKNOWNS_AND_POINT)]] = True
+        groups = [(large & ~starved, radius), (large & starved, _RADIUS_THAT_REACHES_SIX)]
+    return [(faces[chosen[face_label]], rings) for chosen, rings in groups if chosen[face_label].any()]
+
+
+def _ring_sizes(surface: Surface, radius: int) -> npt.NDArray[np.int64]:
+    """Return the number of points (V,) within this many edges of each point, the point included."""
+    rows, columns = np.concatenate([surface.edges, surface.edges[:, ::-1]]).T
+    size = surface.n_points
+    step = sparse.csr_matrix((np.ones(len(rows), dtype=np.bool_), (rows, columns)), shape=(size, size))
+    step = step + sparse.identity(size, dtype=np.bool_, format="csr")
+    reach = step
+    for _ in range(radius - 1):
+        reach = reach @ step
+    return np.diff(reach.indptr)
+
+
+def _integrated(surface: Surface, normals: PointVectors) -> tuple[PointPairs, PointVectors]:
+    """Return rough curvatures sorted by magnitude and the direction of the larger one, from the one-rings."""
+    frames = tangent_frames(normals)
+    centre = surface.faces[:, [0, 0, 1, 1, 2, 2]].ravel()
+    other = surface.faces[:, [1, 2, 2, 0, 0, 1]].ravel()
+    weight = np.repeat(surface.face_areas, 6)
+    chord = surface.points[other] - surface.points[centre]
+    squared = np.einsum("ex,ex->e", chord, chord)
+    height = np.einsum("ex,ex->e", chord, normals[centre])
+    bend = np.divide(-2.0 * height, squared, out=np.zeros_like(squared), where=squared > 0)
+    direction = unit(np.einsum("ekx,ex->ek", frames[centre], chord))
+    total = np.bincount(centre, weight, minlength=surface.n_points)
+    mean = np.zeros((surface.n_points, 2, 2))
+    for row, column in ((0, 0), (0, 1), (1, 0), (1, 1)):
+        term = weight * bend * direction[:, row] * direction[:, column]
+        mean[:, row, column] = np.bincount(centre, term, minlength=surface.n_points)
+    mean = np.divide(mean, total[:, None, None], out=np.zeros_like(mean), where=total[:, None, None] > 0)
+    eigenvalues, vectors = np.linalg.eigh(mean)
+    values = 3.0 * eigenvalues - eigenvalues[:, ::-1]
+    order = np.argsort(np.abs(values), axis=1, kind="stable")
+    larger = np.take_along_axis(vectors, order[:, None, 1:], axis=2)[:, :, 0]
+    return np.take_along_axis(values, order, axis=1), np.einsum("vk,vkx->vx", larger, frames)

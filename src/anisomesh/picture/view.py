@@ -1,0 +1,116 @@
+"""Where to look from: a view of everything and a close-up of the most stretched triangles."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from scipy.spatial import cKDTree
+
+from anisomesh._arrays import FaceScalars, Points, Vector3
+from anisomesh.surface.mesh import Surface
+
+_FACES_IN_CLOSEUP = 150
+_CANDIDATES = 400
+
+
+@dataclass(frozen=True, kw_only=True)
+class View:
+    """A parallel projection.
+
+    Parameters
+    ----------
+    centre
+        The point in the middle of the picture, model units.
+    axes
+        Rows: to the right, up, and towards the viewer; orthonormal (3, 3).
+    half_height
+        Half the height of what is in view, model units.
+    """
+
+    centre: Vector3
+    axes: Points
+    half_height: float
+
+
+def triangle_stretch(surface: Surface) -> FaceScalars:
+    """Return how far each triangle is stretched (F,): 1 for an equilateral one, infinite without area.
+
+    Notes
+    -----
+    The ratio of the singular values of the linear map from an equilateral triangle. With the side lengths
+    a, b, c and the area A, ``q = (a^2 + b^2 + c^2) / (4 sqrt(3) A)`` is half the sum of the ratio and its
+    inverse, hence the ratio is ``q + sqrt(q^2 - 1)``.
+    """
+    squares = (surface.edge_lengths[surface.face_edges] ** 2).sum(axis=1)
+    half_sum = np.full(surface.n_faces, np.inf)
+    np.divide(squares, 4 * np.sqrt(3) * surface.face_areas, out=half_sum, where=surface.face_areas > 0)
+    half_sum = np.maximum(half_sum, 1.0)
+    return np.asarray(half_sum + np.sqrt(half_sum**2 - 1))
+
+
+def whole_view(points: Points, aspect: float) -> View:
+    """Look along the shortest side of the bounding box, turned a little, with every point in view.
+
+    Parameters
+    ----------
+    points
+        What has to be in view (V, 3).
+    aspect
+        Width of the picture divided by its height.
+    """
+    axis = int(np.argmin(np.ptp(points, axis=0)))
+    front = np.eye(3)[axis] * (-1.0 if axis == 1 else 1.0)
+    above = np.eye(3)[1 if axis == 2 else 2]
+    towards = front + 0.45 * np.cross(above, front) + 0.4 * above
+    right = np.cross(above, towards)
+    axes = np.stack([right, np.cross(towards, right), towards])
+    axes /= np.linalg.norm(axes, axis=1, keepdims=True)
+    projected = points @ axes.T
+    low, high = projected.min(axis=0), projected.max(axis=0)
+    half = 0.5 * (high - low)
+    half_height = 1.12 * float(max(half[1], half[0] / aspect)) or 1.0
+    return View(centre=0.5 * (low + high) @ axes, axes=axes, half_height=half_height)
+
+
+def closeup(surface: Surface, view: View, aspect: float) -> View:
+    """Look at the place where the visible triangles are most stretched, about 150 of them in view.
+
+    Notes
+    -----
+    Compares the mean logarithm of the stretch around a few hundred faces that are seen from the front, lowered
+    where the surface does not fill the neighbourhood, and takes the best that nothing hides.
+    """
+    towards = view.axes[2]
+    centroids = surface.points[surface.faces].mean(axis=1)
+    facing = np.maximum(surface.face_normals @ towards, 0.0)
+    stretch = np.log(np.clip(triangle_stretch(surface), 1.0, 30.0))
+    front = np.flatnonzero(facing > 0.6)
+    if len(front) == 0:
+        front = np.arange(surface.n_faces)
+    candidates = front[:: max(1, len(front) // _CANDIDATES)]
+    radius = 1.5 * _half_height(surface.area / surface.n_faces, view, aspect)
+    around = cKDTree(centroids).query_ball_point(centroids[candidates], radius)
+    covered = [(surface.face_areas[faces] * facing[faces]).sum() / (np.pi * radius**2) for faces in around]
+    score = np.array([stretch[faces].mean() for faces in around]) * np.minimum(covered, 1.0)
+    ranked = np.argsort(score, kind="stable")[::-1]
+    best = next((k for k in ranked if _visible(surface, centroids[candidates[k]], towards)), ranked[0])
+    half_height = _half_height(float(surface.face_areas[around[best]].mean()), view, aspect)
+    return View(centre=centroids[candidates[best]], axes=view.axes, half_height=half_height)
+
+
+def _half_height(face_area: float, view: View, aspect: float) -> float:
+    """Return the half height of a close-up that shows the wanted number of faces of this area."""
+    half_height = 0.5 * np.sqrt(_FACES_IN_CLOSEUP * face_area / aspect)
+    return float(np.clip(half_height, 0.04 * view.half_height, 0.2 * view.half_height))
+
+
+def _visible(surface: Surface, point: Vector3, towards: Vector3) -> bool:
+    """Tell whether no face lies between a point of the surface and the viewer."""
+    a, b, c = (surface.points[surface.faces[:, corner]] - point for corner in range(3))
+    weights = np.stack([np.cross(b, c) @ towards, np.cross(c, a) @ towards, np.cross(a, b) @ towards])
+    total = weights.sum(axis=0)
+    hit = ((weights >= 0).all(axis=0) | (weights <= 0).all(axis=0)) & (total != 0)
+    depths = np.stack([a @ towards, b @ towards, c @ towards])
+    depth = (weights[:, hit] * depths[:, hit]).sum(axis=0) / total[hit]
+    return not bool((depth > 1e-6 * surface.diagonal).any())

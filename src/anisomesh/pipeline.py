@@ -1,0 +1,328 @@
+"""From a mesh to an anisotropic mesh: prepare, metric, embedding, CVT, dual."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from dataclasses import dataclass, fields, replace
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+
+from anisomesh.cvt.optimise import Optimised, lloyd, minimise
+from anisomesh.cvt.sampling import resample_by_energy, sample_surface
+from anisomesh.cvt.voronoi import RestrictedVoronoi
+from anisomesh.dual.refine import Refined, refine
+from anisomesh.embedding.base import Embedding
+from anisomesh.embedding.direct import embed
+from anisomesh.errors import MeshError, MetricError, OptionError
+from anisomesh.evaluation.validity import Validity, check_validity
+from anisomesh.metric.tensor import METRIC_NAMES, compute_metric
+from anisomesh.result import RemeshResult, save_rvd
+from anisomesh.surface.geometry import Frame, unit_frame
+from anisomesh.surface.mesh import Surface
+from anisomesh.surface.prepare import Prepared, prepare
+from anisomesh.surface.subdivide import split_long_edges
+
+__all__ = ["RemeshOptions", "RemeshResult", "StepInfo", "remesh", "save_rvd"]
+
+MIN_VERTICES = 4
+COUNT_TOLERANCE = 0.02  # share of the asked vertices by which the result may differ without a warning
+FINE_POINTS = 5_000  # the working surface has edges no longer than an even mesh of so many points
+EDGE_FACTOR = 1.6  # and no longer than this many distances between sites
+DENSITY_SHARPNESS = 4.0  # sharpness of the energy that sites are distributed by, over that of the optimisation
+MAX_GROWTH = 8  # splitting makes at most so many times the faces, or MAX_SPLIT_FACES
+MAX_SPLIT_FACES = 60_000
+
+
+@dataclass(frozen=True, kw_only=True)
+class RemeshOptions:
+    """How to remesh.
+
+    Attributes
+    ----------
+    sharpness
+        The factor s of the normal metric, at least 1: 1 is the plain CVT with the most regular elements, 7 the
+        paper's value, larger values keep the surface and its creases more exactly.
+    final_sharpness
+        If given, the optimisation ends with this factor (30 brings vertices onto corners and creases).
+    metric
+        ``"curvature"``, ``"approximation"``, ``"uniform"``, or tensors (V, 3, 3) at the points of the input, in
+        model units.
+    embedding
+        ``"direct"``.
+    seed
+        Of the start positions; the same seed and input give the same result.
+    threads
+        Worker threads; they do not change the result.
+    lloyd_iterations, max_iterations
+        Iterations of Lloyd's algorithm at the start and bound on those of L-BFGS after it.
+    weld_tolerance
+        Points of the input up to this distance (model units) become one.
+    """
+
+    sharpness: float = 7.0
+    final_sharpness: float | None = None
+    metric: str | npt.NDArray[Any] = "curvature"
+    embedding: str = "direct"
+    seed: int = 0
+    threads: int = 2
+    lloyd_iterations: int = 9
+    max_iterations: int = 60
+    weld_tolerance: float = 0.0
+
+    def __post_init__(self) -> None:
+        for name in ("sharpness", "final_sharpness"):
+            value = getattr(self, name)
+            if value is not None and not (np.isfinite(value) and value >= 1.0):
+                raise OptionError(f"{name} = {value}; expected a finite number of at least 1 (1 is the plain CVT)")
+        if isinstance(self.metric, str) and self.metric not in METRIC_NAMES:
+            raise OptionError(f"metric = {self.metric!r}; expected one of {', '.join(METRIC_NAMES)}, or tensors")
+        if self.embedding != "direct":
+            raise OptionError(f"embedding = {self.embedding!r}; expected 'direct'")
+        for name, low in (("seed", 0), ("threads", 1), ("lloyd_iterations", 0), ("max_iterations", 0)):
+            if getattr(self, name) < low:
+                raise OptionError(f"{name} = {getattr(self, name)}; expected at least {low}")
+
+
+@dataclass(frozen=True, kw_only=True)
+class StepInfo:
+    """One step of a run: the stage, iteration ``iteration`` of at most ``total``, the energy if there is one."""
+
+    stage: str
+    iteration: int = 0
+    total: int = 0
+    energy: float | None = None
+    message: str = ""
+
+
+OnStep = Callable[[StepInfo], None]
+
+
+def remesh(
+    mesh: Any,
+    faces: npt.NDArray[Any] | None = None,
+    *,
+    n_vertices: int | None = None,
+    ratio: float | None = None,
+    options: RemeshOptions | None = None,
+    on_step: OnStep | None = None,
+    **overrides: Any,
+) -> RemeshResult:
+    """Remesh a triangle mesh anisotropically.
+
+    Parameters
+    ----------
+    mesh
+        Points (V, 3) together with ``faces``, or a :class:`Surface`, a ``trimesh.Trimesh`` or a
+        ``pyvista.PolyData`` of triangles.
+    faces
+        Triangles (F, 3), if the first argument is an array of points.
+    n_vertices
+        Vertices of the result, at least 4.
+    ratio
+        Instead of ``n_vertices``: vertices as a share of those of the prepared input.
+    options
+        See :class:`RemeshOptions`; keyword arguments of the same names take precedence.
+    on_step
+        Called with a :class:`StepInfo` as the work proceeds; an exception it raises ends the work.
+
+    Returns
+    -------
+    RemeshResult
+        The mesh and everything it was made from. Where a valid mesh takes more vertices than asked for,
+        ``warnings`` says so.
+
+    Raises
+    ------
+    MeshError
+        If the input is no mesh, or nothing of it is left after the repair.
+    MetricError
+        If given tensors are not symmetric positive definite.
+    OptionError
+        If an option is out of range.
+
+    References
+    ----------
+    "NASM: Neural Anisotropic Surface Meshing", SIGGRAPH Asia 2024.
+    """
+    options = _with_overrides(options or RemeshOptions(), overrides)
+    run = _Run(on_step or (lambda step: None))
+    given = as_surface(mesh, faces)
+    _check_count(n_vertices, ratio)
+    with run.stage("prepare"):
+        prepared = prepare(given, weld_tolerance=options.weld_tolerance)
+        n = n_vertices or max(MIN_VERTICES, round((ratio or 0.0) * prepared.surface.n_points))
+        frame = unit_frame(prepared.surface.points)
+        unit = prepared.surface.with_points(frame.to_unit(prepared.surface.points))
+        split = split_long_edges(unit, max_edge(unit, n), max_faces=max(MAX_GROWTH * unit.n_faces, MAX_SPLIT_FACES))
+        working = split.surface
+    with run.stage("metric"):
+        kind = options.metric
+        if not isinstance(kind, str):
+            kind = split.interpolate(_at_prepared(np.asarray(kind), given, prepared)) * frame.scale**2
+        metric = compute_metric(working, kind)
+    with run.stage("embed"):
+        embedding = embed(working, metric.tensors)
+    with run.stage("cvt"):
+        voronoi = RestrictedVoronoi(embedding.points, working.faces, threads=options.threads)
+        optimised = optimise(voronoi, n, options, run.on_step)
+    with run.stage("dual"):
+        sharpness = options.final_sharpness or options.sharpness
+        refined = refine(voronoi, optimised.sites, Surface(working.points, voronoi.faces).face_neighbours, sharpness=sharpness)
+        surface = _in_model_units(refined, embedding, frame)
+        validity = check_validity(surface, prepared.surface)
+    return RemeshResult(
+        surface=surface,
+        prepared=prepared.surface,
+        prepare_report=prepared.report,
+        working=working,
+        frame=frame,
+        embedding=embedding,
+        diagram=refined.diagram,
+        cells=refined.cells,
+        vertices_asked=n,
+        energy=optimised.energy,
+        iterations=optimised.iterations,
+        status=optimised.status,
+        inserted=refined.inserted,
+        validity=validity,
+        seconds=run.total_seconds(),
+        warnings=tuple(_warnings(n, surface, refined, validity)),
+    )
+
+
+def as_surface(mesh: Any, faces: npt.NDArray[Any] | None = None) -> Surface:
+    """Return a :class:`Surface` from points and faces, a surface, a ``trimesh.Trimesh`` or a ``pyvista.PolyData``.
+
+    Raises
+    ------
+    MeshError
+        If the object is none of these, or has faces that are no triangles.
+    """
+    if isinstance(mesh, Surface):
+        return mesh
+    if faces is not None:
+        return Surface(np.asarray(mesh), np.asarray(faces))
+    if hasattr(mesh, "regular_faces"):  # pyvista
+        if not mesh.is_all_triangles:
+            raise MeshError("the PyVista mesh has faces that are no triangles; call its triangulate() first")
+        return Surface(np.asarray(mesh.points), np.asarray(mesh.regular_faces))
+    if hasattr(mesh, "vertices") and hasattr(mesh, "faces"):  # trimesh
+        return Surface(np.asarray(mesh.vertices), np.asarray(mesh.faces))
+    raise MeshError(
+        f"cannot read a mesh from {type(mesh).__name__}; expected points and faces, a Surface, a trimesh.Trimesh or a "
+        "pyvista.PolyData"
+    )
+
+
+def max_edge(surface: Surface, n_vertices: int) -> float:
+    """Return the edge length that the working surface may have, for this number of sites.
+
+    The embedding is linear on every facet, so facets must resolve both the distance between sites and, on
+    sparse input such as CAD, the change of the metric next to a crease.
+    """
+    return min(EDGE_FACTOR * _even_edge(surface.area, n_vertices), 2.0 * _even_edge(surface.area, FINE_POINTS))
+
+
+def optimise(voronoi: RestrictedVoronoi, n: int, options: RemeshOptions, on_step: OnStep) -> Optimised:
+    """Return n optimised sites: a random start, Lloyd's algorithm, then L-BFGS on the normal-metric energy.
+
+    With a normal metric the sites are drawn anew half-way through Lloyd's algorithm, denser where the surface bends
+    within a cell.
+    """
+    late = options.max_iterations // 2 if options.final_sharpness is not None else 0
+    total = options.lloyd_iterations + options.max_iterations + late
+    done = 0
+
+    def report(iteration: int, energy: float) -> None:
+        on_step(StepInfo(stage="cvt", iteration=done + iteration, total=total, energy=energy))
+
+    rng = np.random.default_rng(options.seed)
+    sites = sample_surface(voronoi.points, voronoi.faces, voronoi.facets.area, n, rng)
+    first = options.lloyd_iterations - options.lloyd_iterations // 3
+    sites = lloyd(voronoi, sites, first, report)
+    done += first
+    if options.sharpness > 1.0:
+        sites = resample_by_energy(voronoi, sites, DENSITY_SHARPNESS * options.sharpness, rng)
+    sites = lloyd(voronoi, sites, options.lloyd_iterations - first, report)
+    done += options.lloyd_iterations - first
+    result = minimise(
+        voronoi, sites, sharpness=options.sharpness, max_iterations=options.max_iterations, on_step=report
+    )
+    if options.final_sharpness is None:
+        return result
+    done += options.max_iterations
+    last = minimise(voronoi, result.sites, sharpness=options.final_sharpness, max_iterations=late, on_step=report)
+    return replace(
+        last, iterations=result.iterations + last.iterations, evaluations=result.evaluations + last.evaluations
+    )
+
+
+class _Run:
+    """Stage times and progress of one run."""
+
+    def __init__(self, on_step: OnStep) -> None:
+        self.on_step = on_step
+        self._seconds = {"load": 0.0}
+        self._start = time.perf_counter()
+
+    @contextmanager
+    def stage(self, name: str) -> Iterator[None]:
+        self.on_step(StepInfo(stage=name))
+        start = time.perf_counter()
+        yield
+        self._seconds[name] = time.perf_counter() - start
+
+    def total_seconds(self) -> dict[str, float]:
+        return {**self._seconds, "total": time.perf_counter() - self._start}
+
+
+def _with_overrides(options: RemeshOptions, overrides: dict[str, Any]) -> RemeshOptions:
+    known = [field.name for field in fields(RemeshOptions)]
+    for name in overrides:
+        if name not in known:
+            raise OptionError(f"remesh has no option {name!r}; expected one of {', '.join(known)}")
+    return replace(options, **overrides)
+
+
+def _check_count(n_vertices: int | None, ratio: float | None) -> None:
+    if (n_vertices is None) == (ratio is None):
+        raise OptionError("give either n_vertices or ratio")
+    if n_vertices is not None and (n_vertices != int(n_vertices) or n_vertices < MIN_VERTICES):
+        raise OptionError(f"n_vertices = {n_vertices}; expected a whole number of at least {MIN_VERTICES}")
+    if ratio is not None and not (np.isfinite(ratio) and ratio > 0.0):
+        raise OptionError(f"ratio = {ratio}; expected a positive number, such as 0.2 for a fifth of the vertices")
+
+
+def _even_edge(area: float, n: int) -> float:
+    """Return the edge length of n vertices spread evenly in equilateral triangles over an area."""
+    return float(np.sqrt(2.0 * area / (np.sqrt(3.0) * n)))
+
+
+def _at_prepared(tensors: npt.NDArray[Any], given: Surface, prepared: Prepared) -> npt.NDArray[np.float64]:
+    if tensors.shape != (given.n_points, 3, 3):
+        raise MetricError(f"metric has shape {tensors.shape}; expected ({given.n_points}, 3, 3), one tensor per point")
+    return np.asarray(tensors[prepared.point_source], dtype=np.float64)
+
+
+def _in_model_units(refined: Refined, embedding: Embedding, frame: Frame) -> Surface:
+    return Surface(frame.to_model(refined.dual.points[:, :3] / embedding.scale), refined.dual.faces)
+
+
+def _warnings(n: int, surface: Surface, refined: Refined, validity: Validity) -> Iterator[str]:
+    if abs(surface.n_points - n) > COUNT_TOLERANCE * n:
+        yield (
+            f"{surface.n_points:,} vertices instead of {n:,}: {refined.inserted:,} were inserted, and "
+            f"{int((~refined.cells.alone).sum()):,} belong to cells in several parts, to keep the surface intact"
+        )
+    if refined.defects.n:
+        yield f"{refined.defects.n:,} defects are left after {refined.rounds} rounds of refinement; ask for more vertices"
+    if not validity.closed:
+        yield "the surface is open: its boundary shrinks by about half a triangle"
+    if validity.euler != validity.euler_input:
+        yield f"the Euler characteristic is {validity.euler} instead of {validity.euler_input}; ask for more vertices"
+    if validity.flipped:
+        yield f"{validity.flipped:,} triangles are turned against the input surface"

@@ -1,0 +1,102 @@
+"""What a remesh returns."""
+
+from __future__ import annotations
+
+import os
+from dataclasses import dataclass
+from typing import Any
+
+from anisomesh.cvt.diagram import Diagram
+from anisomesh.cvt.optimise import Status
+from anisomesh.dual.cells import Cells
+from anisomesh.dual.polygons import PolygonMesh, polygon_mesh, save_polygons
+from anisomesh.embedding.base import Embedding
+from anisomesh.evaluation.validity import Validity
+from anisomesh.surface.geometry import Frame
+from anisomesh.surface.mesh import Surface
+from anisomesh.surface.prepare import PrepareReport
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class RemeshResult:
+    """A remeshed surface and what it was made from.
+
+    Attributes
+    ----------
+    surface
+        The result, in model units.
+    prepared
+        The input after repair, in model units.
+    prepare_report
+        What the repair did, as counts.
+    working
+        The prepared input with long edges split, at bounding-box diagonal 1: what was embedded.
+    frame
+        The similarity between model units and ``working``.
+    embedding
+        The embedding of ``working``.
+    diagram
+        The restricted Voronoi diagram whose dual the result is.
+    cells
+        Its cell components; their numbers are those of the result's vertices.
+    vertices_asked
+        The vertex count asked for.
+    energy, iterations, status
+        Of the optimisation: final energy at diagonal 1, iterations, why it stopped.
+    inserted
+        Sites that were added to make the mesh valid.
+    validity
+        Checks of the result against the prepared input.
+    seconds
+        Wall-clock seconds per stage.
+    warnings
+        What a user should know, one sentence each.
+    """
+
+    surface: Surface
+    prepared: Surface
+    prepare_report: PrepareReport
+    working: Surface
+    frame: Frame
+    embedding: Embedding
+    diagram: Diagram
+    cells: Cells
+    vertices_asked: int
+    energy: float
+    iterations: int
+    status: Status
+    inserted: int
+    validity: Validity
+    seconds: dict[str, float]
+    warnings: tuple[str, ...]
+
+    def report(self) -> dict[str, Any]:
+        """Return the figures of the run as a dictionary that JSON can hold."""
+        return {
+            "vertices_asked": self.vertices_asked,
+            "vertices": self.surface.n_points,
+            "faces": self.surface.n_faces,
+            "seconds": dict(self.seconds),
+            "energy": self.energy,
+            "iterations": self.iterations,
+            "status": self.status.value,
+            "inserted": self.inserted,
+            "stretch": {"mean": self.embedding.stretch.achieved_mean, "max": self.embedding.stretch.achieved_max},
+            "validity": self.validity.as_dict(),
+            "warnings": list(self.warnings),
+        }
+
+    def polygons(self) -> PolygonMesh:
+        """Return the restricted Voronoi diagram as polygons in model units."""
+        return polygon_mesh(self.diagram, self.cells.of_polygon, self.frame.to_model(self.working.points))
+
+
+def save_rvd(result: RemeshResult, path: str | os.PathLike[str]) -> None:
+    """Write the restricted Voronoi diagram of a result as polygons, .vtu or .obj, coloured by cell.
+
+    Raises
+    ------
+    MeshFileError
+        If the suffix is another one, or the file cannot be written.
+    """
+    save_polygons(result.polygons(), path)

@@ -1,0 +1,82 @@
+"""Polygons as files hold them, and the triangles they become."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+
+from anisomesh._arrays import Points
+
+
+@dataclass(frozen=True, kw_only=True)
+class PolygonSoup:
+    """What a reader found in a file, not validated yet.
+
+    Parameters
+    ----------
+    points
+        Coordinates (V, 3).
+    corners
+        Point indices of all polygons, one after the other.
+    sizes
+        Number of corners of each polygon.
+    """
+
+    points: npt.NDArray[np.float64]
+    corners: npt.NDArray[np.int64]
+    sizes: npt.NDArray[np.int64]
+
+
+def of_equal_size(points: npt.NDArray[Any], polygons: npt.NDArray[Any]) -> PolygonSoup:
+    """Return the soup of polygons (n, k) that all have k corners."""
+    return PolygonSoup(
+        points=np.asarray(points, dtype=np.float64),
+        corners=np.asarray(polygons, dtype=np.int64).ravel(),
+        sizes=np.full(len(polygons), polygons.shape[1], dtype=np.int64),
+    )
+
+
+def check(soup: PolygonSoup) -> None:
+    """Raise ValueError if the soup has no polygon, an index out of range or a coordinate that is not finite."""
+    if len(soup.sizes) == 0:
+        raise ValueError("it has no face")
+    few = np.flatnonzero(soup.sizes < 3)
+    if len(few):
+        raise ValueError(f"face {few[0]} has {soup.sizes[few[0]]} corners; expected at least 3")
+    n_points = len(soup.points)
+    bad = np.flatnonzero((soup.corners < 0) | (soup.corners >= n_points))
+    if len(bad):
+        face = np.searchsorted(np.cumsum(soup.sizes), bad[0], side="right")
+        index = soup.corners[bad[0]]
+        raise ValueError(f"face {face} refers to point {index} (counted from 0) but there are {n_points} points")
+    bad = np.flatnonzero(~np.isfinite(soup.points).all(axis=1))
+    if len(bad):
+        raise ValueError(f"point {bad[0]} (counted from 0) is {soup.points[bad[0]].tolist()}, which is not finite")
+
+
+def triangulate(soup: PolygonSoup) -> npt.NDArray[np.int64]:
+    """Return the triangles (F, 3) of the polygons, in the order of the polygons.
+
+    Notes
+    -----
+    A quadrilateral is split along its shorter diagonal, a larger polygon into a fan from its first corner.
+    """
+    sizes, corners = soup.sizes, soup.corners
+    if (sizes == 3).all():
+        return corners.reshape(-1, 3)
+    first = np.cumsum(sizes) - sizes
+    polygon = np.repeat(np.arange(len(sizes)), sizes - 2)
+    turn = np.arange(len(polygon)) - np.repeat(np.cumsum(sizes - 2) - (sizes - 2), sizes - 2)
+    shift = np.zeros(len(sizes), dtype=np.int64)
+    quads = np.flatnonzero(sizes == 4)
+    a, b, c, d = (soup.points[corners[first[quads] + k]] for k in range(4))
+    shift[quads] = _length(b, d) < _length(a, c)
+    local = np.stack([np.zeros_like(turn), turn + 1, turn + 2], axis=1) + shift[polygon, None]
+    return corners[first[polygon, None] + local % sizes[polygon, None]]
+
+
+def _length(a: Points, b: Points) -> npt.NDArray[np.float64]:
+    return np.asarray(np.linalg.norm(a - b, axis=1))

@@ -1,0 +1,75 @@
+"""The frozen Surface: validation, immutability, derived tables against closed forms."""
+
+import numpy as np
+import pytest
+
+from anisomesh.errors import MeshError
+from anisomesh.surface import shapes
+from anisomesh.surface.geometry import unit_frame
+from anisomesh.surface.mesh import Surface
+
+POINTS = np.array([[0.0, 0, 0], [1, 0, 0], [0, 1, 0], [0, 0, 1]])
+
+
+@pytest.mark.parametrize(
+    ("points", "faces", "message"),
+    [
+        (POINTS[:, :2], [[0, 1, 2]], r"\(4, 2\); expected \(V, 3\)"),
+        (POINTS, [[0, 1, 2, 3]], "triangulate"),
+        (POINTS, np.zeros((0, 3), dtype=int), "no face"),
+        (POINTS, [[0.0, 1.0, 2.0]], "expected integers"),
+        (np.where(POINTS == 1, np.nan, POINTS), [[0, 1, 2]], r"points\[1\].*not finite \(3 such"),
+        (POINTS, [[0, 1, 2], [0, 1, 4]], r"faces\[1\] = \[0, 1, 4\].*4 points"),
+        (POINTS, [[0, -1, 2]], "out of range"),
+        (POINTS, [[0, 1, 2**32]], "out of range"),
+    ],
+)
+def test_bad_arrays_are_refused(points, faces, message):
+    with pytest.raises(MeshError, match=message):
+        Surface(points, np.asarray(faces))
+
+
+def test_arrays_are_copied_and_read_only():
+    points, faces = POINTS.copy(), np.array([[0, 1, 2]])
+    surface = Surface(points, faces)
+    points[:] = 7
+    faces[:] = 0
+    np.testing.assert_array_equal(surface.points, POINTS)
+    np.testing.assert_array_equal(surface.faces, [[0, 1, 2]])
+    assert (surface.points.dtype, surface.faces.dtype) == (np.float64, np.int32)
+    with pytest.raises(ValueError, match="read-only"):
+        surface.points[0, 0] = 1
+    with pytest.raises(ValueError, match="read-only"):
+        surface.faces[0, 0] = 1
+
+
+def test_geometry_of_a_box():
+    box = shapes.box((1, 2, 3), n=2)
+    assert box.area == pytest.approx(22)
+    assert box.diagonal == pytest.approx(np.sqrt(14))
+    centres = box.points[box.faces].mean(axis=1) - [0.5, 1, 1.5]
+    outward = (box.face_normals * centres).sum(axis=1)
+    np.testing.assert_allclose(np.unique(outward.round(9)), [0.5, 1, 1.5])
+    corner = int(np.flatnonzero((box.points == 0).all(axis=1))[0])
+    assert (box.point_normals[corner] < 0).all()
+
+
+def test_normals_of_a_sphere_point_outwards():
+    ball = shapes.sphere(4)
+    np.testing.assert_allclose(ball.point_normals, ball.points, atol=0.01)
+
+
+def test_degenerate_faces_have_no_normal_and_no_area():
+    flat = Surface(np.vstack([POINTS, [2, 0, 0]]), [[0, 1, 4], [2, 2, 3]])
+    np.testing.assert_array_equal(flat.face_normals, 0)
+    assert flat.area == 0
+
+
+@pytest.mark.parametrize("scale", [1e-20, 1.0, 1e20])
+def test_unit_frame_is_a_similarity_onto_diagonal_one(scale):
+    points = scale * (shapes.sphere(1).points * [1, 2, 3] + 100)
+    frame = unit_frame(points)
+    inside = frame.to_unit(points)
+    assert np.linalg.norm(np.ptp(inside, axis=0)) == pytest.approx(1)
+    np.testing.assert_allclose(inside.max(axis=0), -inside.min(axis=0), atol=1e-12)
+    np.testing.assert_allclose(frame.to_model(inside), points, rtol=1e-13)
