@@ -70,7 +70,7 @@ class RemeshOptions:
     seed: int = 0
     threads: int = 2
     lloyd_iterations: int = 9
-    max_iterations: int = 60
+    max_iterations: int = 100
     weld_tolerance: float = 0.0
 
     def __post_init__(self) -> None:

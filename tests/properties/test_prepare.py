@@ -73,7 +73,8 @@ def soups(draw):
     coordinate = st.integers(0, 2) if draw(st.booleans()) else st.floats(-1, 1, width=32)
     points = draw(st.lists(st.tuples(coordinate, coordinate, coordinate), min_size=n_points, max_size=n_points))
     index = st.integers(0, n_points - 1)
-    faces = draw(st.lists(st.tuples(index, index, index), min_size=1, max_size=24))
+    any_face, true_face = st.tuples(index, index, index), st.permutations(range(n_points)).map(lambda order: order[:3])
+    faces = draw(st.lists(draw(st.sampled_from([any_face, true_face])), min_size=1, max_size=48))
     return Surface(np.array(points, dtype=float), np.array(faces))
 
 
@@ -266,6 +267,18 @@ def test_flap_on_a_closed_surface_goes_away():
     check(prepared, flap)
     assert n_boundary(prepared.surface) == 0
     assert prepared.surface.n_faces == 4
+
+
+@pytest.mark.parametrize("other", [[1, 0, 4], [0, 1, 4]])
+def test_flap_without_area_goes_away(other):
+    points = np.vstack([np.zeros(3), np.eye(3), [0.25, 0, 0]])
+    flap = Surface(points, np.vstack([TETRAHEDRON, [[0, 1, 4], other]]))
+    prepared = prepare(flap)
+    check(prepared, flap)
+    assert prepared.surface.area == pytest.approx(1.5 + np.sqrt(3) / 2, rel=1e-12)
+    if other == [1, 0, 4]:
+        assert n_boundary(prepared.surface) == 0
+        np.testing.assert_array_equal(prepared.surface.faces, TETRAHEDRON)
 
 
 @pytest.mark.parametrize("order", list(permutations(range(3))))

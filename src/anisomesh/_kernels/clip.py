@@ -180,13 +180,19 @@ def _cut(work, source, n, n_lost, first, j, size):
 
 
 @njit(cache=True, nogil=True, forceinline=True)
-def _measure(work, source, first, n, wa, wb, wc, sa, sb, sc):
-    """Compute the squared distances of the vertices from ``first`` on; return the largest of all."""
+def _measure(work, source, first, n, wa, wb, wc, sa, sb, sc, slack):
+    """Bound the squared distances of the vertices from ``first`` on; return the largest bound of all.
+
+    A vertex whose coordinates are wrong by e may be off by 2 e times the longest side. ``slack`` is for rounding.
+    """
+    longest2 = max(sa, sb, sc)
     for m in range(first, n):
         la = work[source, m, 0]
         lb = work[source, m, 1]
         lc = work[source, m, 2]
-        work[source, m, _SQUARE] = la * wa + lb * wb + lc * wc - (lb * lc * sa + lc * la * sb + la * lb * sc)
+        square = la * wa + lb * wb + lc * wc - (lb * lc * sa + lc * la * sb + la * lb * sc)
+        error = work[source, m, _ERROR]
+        work[source, m, _SQUARE] = square + slack + 2.0 * error * (square + slack + (1.0 + 2.0 * error) * longest2)
     largest = 0.0
     for m in range(n):
         largest = max(largest, work[source, m, _SQUARE])
@@ -194,15 +200,15 @@ def _measure(work, source, first, n, wa, wb, wc, sa, sb, sc):
 
 
 @njit(cache=True, nogil=True, forceinline=True)
-def _whole_facet(work, wa, wb, wc):
+def _whole_facet(work, wa, wb, wc, slack):
     """Start the polygon as the whole facet."""
     for k in range(3):
         for c in range(4):
             work[0, k, c] = 1.0 if c == k else 0.0
         work[0, k, _LABEL] = -1 - (k + 2) % 3
-    work[0, 0, _SQUARE] = wa
-    work[0, 1, _SQUARE] = wb
-    work[0, 2, _SQUARE] = wc
+    work[0, 0, _SQUARE] = wa + slack
+    work[0, 1, _SQUARE] = wb + slack
+    work[0, 2, _SQUARE] = wc + slack
 
 
 @njit(cache=True, nogil=True)
@@ -217,6 +223,7 @@ def clip_facet(facet, owner, facets, sites, ws):
     a, b, c = facets.faces[facet, 0], facets.faces[facet, 1], facets.faces[facet, 2]
     sa, sb, sc = facets.side2[facet, 0], facets.side2[facet, 1], facets.side2[facet, 2]
     points = facets.points
+    rounding = 8.0 * (positions.shape[1] + 4) * _UNIT_ROUNDOFF
     clock[0] += 1
     now = clock[0]
     _fill_row(table, 0, owner, positions, points, a, b, c)
@@ -236,8 +243,9 @@ def clip_facet(facet, owner, facets, sites, ws):
         head += 1
         site = candidate[i]
         wa, wb, wc = table[i, 0], table[i, 1], table[i, 2]
-        _whole_facet(work, wa, wb, wc)
-        radius2 = max(wa, wb, wc)
+        slack = rounding * max(wa, wb, wc)
+        _whole_facet(work, wa, wb, wc, slack)
+        radius2 = max(wa, wb, wc) + slack
         n = 3
         source = 0
         rival = -1
@@ -271,7 +279,7 @@ def clip_facet(facet, owner, facets, sites, ws):
                 return BUFFER_TOO_SMALL
             n = _cut(work, source, n, n_lost, first, j, abs(fa) + abs(fb) + abs(fc))
             source = 1 - source
-            radius2 = _measure(work, source, n - 2, n, wa, wb, wc, sa, sb, sc)
+            radius2 = _measure(work, source, n - 2, n, wa, wb, wc, sa, sb, sc, slack)
         if n == 0:
             # only the start site can have no part of the facet; whatever took the last of it is tried next
             if n_polygons > 0 or queued[rival]:

@@ -41,3 +41,27 @@ def refresh_lists(which, positions, start, neighbours, distance2):
                 m -= 1
             distance2[m] = d2
             neighbours[m] = other
+
+
+@njit(cache=True, nogil=True)
+def limit_radius(start, neighbours, distance, index, radius):
+    """Lower the radius of each site to the distance of the nearest probe that its list does not hold.
+
+    ``distance`` and ``index`` (S, k) are probes in order of distance, index -1 for none. If a list holds all
+    probes, the distance of the last bounds that of the next one.
+    """
+    for site in range(radius.shape[0]):
+        for p in range(index.shape[1]):
+            other = index[site, p]
+            if other < 0 or distance[site, p] > radius[site]:
+                break
+            if other == site:
+                continue
+            held = False
+            for k in range(start[site], start[site + 1]):
+                if neighbours[k] == other:
+                    held = True
+                    break
+            if not held or p == index.shape[1] - 1:
+                radius[site] = distance[site, p]
+                break

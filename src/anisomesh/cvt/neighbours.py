@@ -10,13 +10,17 @@ from scipy.spatial import cKDTree
 
 from anisomesh._arrays import Sites
 from anisomesh._kernels import clip
-from anisomesh._kernels.neighbours import displacements, refresh_lists
+from anisomesh._kernels.neighbours import displacements, limit_radius, refresh_lists
 
 _BASE_NEIGHBOURS = 24
-_WORN = 0.5  # a list whose complete radius has shrunk below this share is worn
-_WORN_SITES = 0.1  # all lists are rebuilt when more than this share of them is worn
-_SPARE = 1.3  # lists that prove too short are made this much longer than needed
-_MAX_EPOCHS = 6
+_FAR = 0.2  # of the median list radius: when a site is this far from its anchor, sites are anchored anew
+_NEAR = 0.08  # and these are the ones farther from their anchors than this
+_MOST = 0.3  # of all sites; if more are to be anchored anew, all lists are rebuilt
+_SPARE = 1.3  # a list that proves too short is made this much longer than needed
+_PROBES = 4  # newly anchored sites that are looked for near every other site
+
+Floats = npt.NDArray[np.float64]
+Rows = npt.NDArray[np.intp]
 
 
 class NeighbourLists:
@@ -24,93 +28,118 @@ class NeighbourLists:
 
     Notes
     -----
-    A list built at reference positions holds every site within the distance of its last entry. Once the site
-    has moved by a and no site by more than b it is still complete within that distance less a + b (Verlet
-    1967), so most calls need no search: distances are recomputed and the list, almost sorted, is sorted
-    again. A list that proves too short is sought anew, and longer, in a k-d tree; each such time is an epoch
-    with reference positions of its own.
+    Every site i has an anchor a_i, where it once was, and a radius r_i; its list holds every site whose anchor is
+    within r_i of a_i. Hence it holds every site that is *now* within r_i - |x_i - a_i| - max_j |x_j - a_j| of the
+    site (after Verlet 1967), and most calls need no search: distances are recomputed and the list, almost sorted,
+    is sorted again. When a site has moved far it is anchored anew where it is, with a new list; another site
+    that has it in its list loses nothing, one that has not gets a smaller radius. A list that proves too short is
+    sought again, longer, among the anchors.
     """
 
     def __init__(self) -> None:
         self.n_sites = 0
-        self._references: list[npt.NDArray[np.float64]] = []
-        self._tree: cKDTree | None = None
+        self._tree: cKDTree | None = None  # of the anchors
+        self._current: cKDTree | None = None  # of the positions in the last call of table
 
     def table(self, sites: Sites, threads: int) -> clip.Sites:
         """Return sorted lists for these positions (S, d)."""
-        self._tree = None
+        self._current = None
         if len(sites) != self.n_sites:
-            self.n_sites = len(sites)
-            self._counts = np.full(self.n_sites, min(_BASE_NEIGHBOURS, self.n_sites - 1))
             self._rebuild(sites, threads)
-        complete = self._complete(sites)
-        worn = np.mean(complete < _WORN * self._radius) > _WORN_SITES
-        if worn or len(self._references) > _MAX_EPOCHS:
-            self._counts = np.maximum(self._counts // 2, min(_BASE_NEIGHBOURS, self.n_sites - 1))
-            self._rebuild(sites, threads)
-            complete = self._radius.copy()
+        self._moved = np.empty(self.n_sites)
+        self._farthest = displacements(sites, self._anchors, self._moved)
+        if self._farthest > _FAR * self._typical:
+            movers = np.flatnonzero(self._moved > _NEAR * self._typical)
+            if len(movers) > _MOST * self.n_sites:
+                self._rebuild(sites, threads)
+            else:
+                self._anchor(sites, movers, threads)
+            self._farthest = displacements(sites, self._anchors, self._moved)
         self._refresh(sites, np.arange(self.n_sites), threads)
-        return clip.Sites(sites, self._start, self._neighbours, self._distance2, complete)
+        return self._as_table(sites)
 
-    def grow(self, sites: Sites, needed: npt.NDArray[np.float64], threads: int) -> clip.Sites:
-        """Return the table with new lists for the sites whose needed radius (S,) is not 0.
+    def grow(self, sites: Sites, needed: Floats, threads: int) -> clip.Sites:
+        """Return the table with longer lists for the sites whose needed radius (S,) is not 0.
 
         The positions must be those of the last call of ``table``.
         """
         short = np.flatnonzero(needed)
+        wanted = _SPARE * needed[short] + self._moved[short] + self._farthest
         old_start, old_counts = self._start, self._counts.copy()
-        found: list[tuple[npt.NDArray[np.intp], npt.NDArray[np.int32]]] = []
-        todo = short
-        while len(todo):
-            for count in np.unique(self._counts[todo]):
-                group = todo[self._counts[todo] == count]
-                lists, self._radius[group] = self._query(sites, group, int(count), threads)
-                found.append((group, lists))
-            todo = todo[self._radius[todo] < _SPARE * needed[todo]]
-            self._counts[todo] = np.minimum(2 * self._counts[todo], self.n_sites - 1)
+        found: list[tuple[Rows, npt.NDArray[np.int32]]] = []
+        while len(short):
+            for count in np.unique(self._counts[short]):
+                group = short[self._counts[short] == count]
+                found.append((group, self._search(group, int(count), threads)))
+            unmet = self._radius[short] < wanted
+            short, wanted = short[unmet], wanted[unmet]
+            self._counts[short] = np.minimum(2 * self._counts[short], self.n_sites - 1)
         self._start = np.concatenate([[0], np.cumsum(self._counts)])
-        kept = np.ones(self.n_sites, dtype=bool)
-        kept[short] = False
+        kept = needed == 0.0
         into, out_of = np.repeat(kept, self._counts), np.repeat(kept, old_counts)
         neighbours, distance2 = np.empty(self._start[-1], dtype=np.int32), np.zeros(self._start[-1])
         neighbours[into], distance2[into] = self._neighbours[out_of], self._distance2[out_of]
         self._neighbours, self._distance2 = neighbours, distance2
         for group, lists in found:
-            final = self._counts[group] == lists.shape[1]
-            neighbours[self._start[group[final]][:, None] + np.arange(lists.shape[1])] = lists[final]
-        if not np.array_equal(sites, self._references[-1]):
-            self._references.append(np.array(sites))
-        self._epoch[short] = len(self._references) - 1
-        self._refresh(sites, short, threads)
-        return clip.Sites(sites, self._start, neighbours, distance2, self._complete(sites))
+            self._put(group, lists)
+        self._refresh(sites, np.flatnonzero(needed), threads)
+        return self._as_table(sites)
 
-    def nearest(self, queries: npt.NDArray[np.float64], sites: Sites, threads: int) -> npt.NDArray[np.int32]:
+    def nearest(self, queries: Floats, sites: Sites, threads: int) -> npt.NDArray[np.int32]:
         """Return the site nearest to each point (n, d); ``sites`` as in the last call of ``table``."""
-        return np.asarray(self._tree_of(sites).query(queries, workers=threads)[1], dtype=np.int32)
+        if self._current is None:
+            self._current = cKDTree(sites)
+        return np.asarray(self._current.query(queries, workers=threads)[1], dtype=np.int32)
+
+    def _as_table(self, sites: Sites) -> clip.Sites:
+        complete = self._radius - self._moved - self._farthest
+        return clip.Sites(sites, self._start, self._neighbours, self._distance2, complete)
 
     def _rebuild(self, sites: Sites, threads: int) -> None:
-        self._references = [np.array(sites)]
-        self._epoch = np.zeros(self.n_sites, dtype=np.int32)
+        count = min(_BASE_NEIGHBOURS, len(sites) - 1)
+        self.n_sites = len(sites)
+        self._anchors = np.array(sites)
+        self._tree = cKDTree(self._anchors)
+        self._counts = np.full(self.n_sites, count)
         self._radius = np.empty(self.n_sites)
-        self._start = np.concatenate([[0], np.cumsum(self._counts)])
-        self._neighbours = np.empty(self._start[-1], dtype=np.int32)
-        self._distance2 = np.zeros(self._start[-1])
-        for count in np.unique(self._counts):
-            group = np.flatnonzero(self._counts == count)
-            lists, self._radius[group] = self._query(sites, group, int(count), threads)
-            self._neighbours[self._start[group][:, None] + np.arange(count)] = lists
+        self._start = np.arange(self.n_sites + 1) * count
+        self._neighbours = np.ascontiguousarray(self._search(np.arange(self.n_sites), count, threads).ravel())
+        self._distance2 = np.zeros(len(self._neighbours))
+        self._typical = float(np.median(self._radius))
 
-    def _complete(self, sites: Sites) -> npt.NDArray[np.float64]:
-        """Return the radius within which each list holds all sites (S,)."""
-        complete = self._radius.copy()
-        moved = np.empty(self.n_sites)
-        for epoch, reference in enumerate(self._references):
-            farthest = displacements(sites, reference, moved)
-            members = slice(None) if len(self._references) == 1 else self._epoch == epoch
-            complete[members] -= moved[members] + farthest
-        return complete
+    def _anchor(self, sites: Sites, movers: Rows, threads: int) -> None:
+        """Anchor these sites where they are now."""
+        self._anchors[movers] = sites[movers]
+        self._tree = cKDTree(self._anchors)
+        moved_tree = cKDTree(self._anchors[movers])
+        probes = min(_PROBES, len(movers))
+        distance, index = moved_tree.query(
+            self._anchors, range(1, probes + 1), distance_upper_bound=float(self._radius.max()), workers=threads
+        )
+        index = np.append(movers, -1)[np.minimum(index, len(movers))]
+        limit_radius(self._start, self._neighbours, distance, index, self._radius)
+        for count in np.unique(self._counts[movers]):
+            group = movers[self._counts[movers] == count]
+            self._put(group, self._search(group, int(count), threads))
 
-    def _refresh(self, sites: Sites, which: npt.NDArray[np.intp], threads: int) -> None:
+    def _search(self, group: Rows, count: int, threads: int) -> npt.NDArray[np.int32]:
+        """Return the ``count`` other sites with the nearest anchors (n, count) and set the radius they fill."""
+        if count == 0:
+            self._radius[group] = np.inf
+            return np.zeros((len(group), 0), dtype=np.int32)
+        assert self._tree is not None
+        distance, index = self._tree.query(self._anchors[group], count + 1, workers=threads)
+        others = index != group[:, None]
+        others[others.all(axis=1), -1] = False
+        self._radius[group] = distance[:, -1] if count < self.n_sites - 1 else np.inf
+        return np.asarray(index[others].reshape(len(group), count), dtype=np.int32)
+
+    def _put(self, group: Rows, lists: npt.NDArray[np.int32]) -> None:
+        """Store lists (n, k) for those of a group whose lists have that length."""
+        fits = self._counts[group] == lists.shape[1]
+        self._neighbours[self._start[group[fits]][:, None] + np.arange(lists.shape[1])] = lists[fits]
+
+    def _refresh(self, sites: Sites, which: Rows, threads: int) -> None:
         arrays = (sites, self._start, self._neighbours, self._distance2)
         shares = np.array_split(which, min(threads, 1 + len(which) // 1000))
         if len(shares) == 1:
@@ -118,20 +147,3 @@ class NeighbourLists:
             return
         with ThreadPoolExecutor(len(shares)) as pool:
             list(pool.map(lambda share: refresh_lists(share, *arrays), shares))
-
-    def _tree_of(self, sites: Sites) -> cKDTree:
-        if self._tree is None:
-            self._tree = cKDTree(sites)
-        return self._tree
-
-    def _query(
-        self, sites: Sites, group: npt.NDArray[np.intp], count: int, threads: int
-    ) -> tuple[npt.NDArray[np.int32], npt.NDArray[np.float64]]:
-        """Return the nearest ``count`` other sites (n, count) of a group and the radius they fill."""
-        if count == 0:
-            return np.zeros((len(group), 0), dtype=np.int32), np.full(len(group), np.inf)
-        distance, index = self._tree_of(sites).query(sites[group], count + 1, workers=threads)
-        others = index != group[:, None]
-        others[others.all(axis=1), -1] = False
-        radius = distance[:, -1] if count < self.n_sites - 1 else np.full(len(group), np.inf)
-        return index[others].reshape(len(group), count).astype(np.int32), np.array(radius)

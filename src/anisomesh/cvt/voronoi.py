@@ -205,7 +205,7 @@ class _Buffers:
             work=np.zeros((2, size, 7)),
             needed=np.zeros(n_sites),
         )
-        rows = min(n_sites, _CHUNK * size)
+        rows = min(n_sites + candidates, _CHUNK * size)
         self.row_of = np.full(n_sites, -1, dtype=np.int32)
         self.touched = np.zeros(rows, dtype=np.int32)
         self.accumulated = np.zeros((rows, dimension + 2))

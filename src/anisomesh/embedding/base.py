@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from enum import Enum
+from enum import StrEnum
 from typing import Protocol
 
 import numpy as np
@@ -14,7 +14,7 @@ from anisomesh.embedding.gradient import face_frames, face_gradient, face_tensor
 from anisomesh.surface.mesh import Surface
 
 
-class EmbeddingStatus(str, Enum):
+class EmbeddingStatus(StrEnum):
     """Why the iteration stopped."""
 
     EXACT = "the metric is a multiple of the identity: no extra coordinates are needed"
@@ -120,7 +120,7 @@ def _stretch(tensors: npt.NDArray[np.float64]) -> FaceScalars:
     larger = larger_eigenvalue(tensors)
     smaller = tensors[:, 0, 0] + tensors[:, 1, 1] - larger
     ratio = np.divide(larger, smaller, out=np.ones_like(larger), where=smaller > 1e-14 * larger)
-    return np.sqrt(np.maximum(ratio, 1.0))
+    return np.asarray(np.sqrt(np.maximum(ratio, 1.0)))
 
 
 def _quantiles(

@@ -5,16 +5,16 @@ from __future__ import annotations
 import numpy as np
 import numpy.typing as npt
 
-from anisomesh._arrays import EmbeddedPoints, PointScalars, PointTensors, PointVectors
+from anisomesh._arrays import EmbeddedPoints, PointScalars, PointTensors
 from anisomesh.embedding.base import Embedding, EmbeddingStatus, stretch_statistics
 from anisomesh.embedding.gradient import FaceGradient, FaceTensors, eigen_2x2, face_gradient, face_tensors
+from anisomesh.embedding.polar import polar_factors
 from anisomesh.embedding.poisson import poisson_solver
 from anisomesh.errors import OptionError
 from anisomesh.surface.mesh import Surface
 
 _POSITION_SHARE = 0.01
 _INVARIANT_SHARE = 0.2
-_DEFICIENT = 1e-10
 
 Maps = npt.NDArray[np.float64]
 
@@ -124,41 +124,6 @@ def mean_bend(surface: Surface, gradient: FaceGradient) -> PointScalars:
     return np.divide(total, areas, out=np.zeros_like(total), where=areas > 0.0)
 
 
-def polar_factors(maps: Maps, fallback: Maps) -> Maps:
-    """Return the closest maps (F, k, 2) with orthonormal columns to linear maps (F, k, 2).
-
-    Parameters
-    ----------
-    maps
-        Linear maps A from a face plane to k dimensions.
-    fallback
-        Maps (F, k, 2) with orthonormal columns (or zero columns, for faces without a plane) that supply the
-        directions which a map of lower rank leaves open.
-
-    Notes
-    -----
-    With A^t A = W diag(l1, l2) W^t the factor is A W diag(1/sqrt l) W^t, in closed form for all faces at once.
-    The second column of A W is made orthogonal to the first again before it is divided by its length.
-    """
-    (_, vectors) = eigen_2x2(maps.transpose(0, 2, 1) @ maps)
-    turned, other = maps @ vectors, fallback @ vectors
-    size = np.sqrt(np.einsum("fki,fki->f", maps, maps))
-    first = _normalised(turned[:, :, 0], _DEFICIENT * size, other[:, :, 0])
-    second = turned[:, :, 1] - np.einsum("fk,fk->f", first, turned[:, :, 1])[:, None] * first
-    spare = other[:, :, 1] - np.einsum("fk,fk->f", first, other[:, :, 1])[:, None] * first
-    spare_first = other[:, :, 0] - np.einsum("fk,fk->f", first, other[:, :, 0])[:, None] * first
-    weak = np.einsum("fk,fk->f", spare, spare) < np.einsum("fk,fk->f", spare_first, spare_first)
-    spare = _normalised(np.where(weak[:, None], spare_first, spare), np.zeros(len(maps)), np.zeros_like(spare))
-    second = _normalised(second, _DEFICIENT * size, spare)
-    return np.stack([first, second], axis=2) @ vectors.transpose(0, 2, 1)
-
-
-def _normalised(vectors: PointVectors, least: npt.NDArray[np.float64], otherwise: PointVectors) -> PointVectors:
-    length = np.sqrt(np.einsum("fk,fk->f", vectors, vectors))
-    usable = length > least
-    return np.where(usable[:, None], vectors / np.where(usable, length, 1.0)[:, None], otherwise)
-
-
 def _split(metric: FaceTensors, gradient: FaceGradient) -> tuple[float, FaceTensors]:
     """Return the factor of the coordinates and the square roots (F, 2, 2) of what the extra ones must carry."""
     eigenvalues, vectors = eigen_2x2(metric)
@@ -180,18 +145,24 @@ def _local_global(
     tolerance: float,
 ) -> tuple[EmbeddedPoints, float, int]:
     """Return the extra coordinates (V, k), the relative residual and the number of global solves."""
-    fallback = np.zeros((surface.n_faces, start.shape[1], 2))
-    fallback[:, :3] = gradient.frames.transpose(0, 2, 1)
+    fallback = np.zeros((surface.n_faces, 2, start.shape[1]))
+    fallback[:, :, :3] = gradient.frames
     integrate = poisson_solver(surface, gradient)
     norm = float(np.einsum("f,fij,fij->", gradient.areas, root, root))
     extra, residual = start, np.inf
     for iteration in range(max_iterations + 1):
-        jacobian = (gradient.operator @ extra).reshape(surface.n_faces, 2, -1).transpose(0, 2, 1)
-        target = polar_factors(jacobian @ root, fallback) @ root
+        jacobian = (gradient.operator @ extra).reshape(surface.n_faces, 2, -1)
+        target = _product(root, polar_factors(_product(root, jacobian), fallback))
         difference = jacobian - target
         previous = residual
-        residual = float(np.sqrt(np.einsum("f,fki,fki->", gradient.areas, difference, difference) / norm))
+        residual = float(np.sqrt(gradient.areas @ np.einsum("fik,fik->f", difference, difference) / norm))
         if iteration == max_iterations or (iteration > 1 and residual > (1.0 - tolerance) * previous):
             break
-        extra = integrate(target.transpose(0, 2, 1))
+        extra = integrate(target)
     return extra, residual, iteration
+
+
+def _product(root: FaceTensors, maps: Maps) -> Maps:
+    """Return the maps (F, 2, k) after the symmetric tensors (F, 2, 2)."""
+    rows = [root[:, i, :1] * maps[:, 0] + root[:, i, 1:] * maps[:, 1] for i in range(2)]
+    return np.stack(rows, axis=1)

@@ -80,7 +80,7 @@ def face_gradient(surface: Surface) -> FaceGradient:
 def face_tensors(surface: Surface, tensors: PointTensors, frames: FaceFrames) -> FaceTensors:
     """Return the mean over the corners of tensors (V, 3, 3), restricted to the face planes, (F, 2, 2)."""
     mean = tensors[surface.faces].mean(axis=1)
-    return frames @ mean @ frames.transpose(0, 2, 1)
+    return np.asarray(frames @ mean @ frames.transpose(0, 2, 1))
 
 
 def larger_eigenvalue(tensors: FaceTensors) -> FaceScalars:

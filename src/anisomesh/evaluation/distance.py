@@ -103,7 +103,7 @@ def sample_uniformly(surface: Surface, count: int, rng: np.random.Generator) -> 
     face = rng.choice(surface.n_faces, size=count, p=share)
     root, second = np.sqrt(rng.random(count)), rng.random(count)
     weights = np.stack([1.0 - root, root * (1.0 - second), root * second], axis=1)
-    return np.einsum("nc,ncx->nx", weights, surface.points[surface.faces[face]])
+    return np.asarray(np.einsum("nc,ncx->nx", weights, surface.points[surface.faces[face]]))
 
 
 def _one_way(a: Surface, b: Surface, samples: int, rng: np.random.Generator) -> tuple[float, float]:

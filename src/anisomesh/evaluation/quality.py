@@ -38,7 +38,8 @@ def anisotropic_quality(points: Points, faces: Faces, roots: PointTensors) -> Fa
     lengths = np.sqrt(np.einsum("fci,fci->fc", sides, sides))
     area = 0.5 * np.linalg.norm(np.cross(sides[:, 1], sides[:, 2]), axis=1)
     denominator = 0.5 * lengths.sum(axis=1) * lengths.max(axis=1)
-    return np.divide(2.0 * np.sqrt(3.0) * area, denominator, out=np.zeros_like(area), where=denominator > 0.0)
+    regular = 2.0 * np.sqrt(3.0)
+    return np.asarray(np.divide(regular * area, denominator, out=np.zeros_like(area), where=denominator > 0.0))
 
 
 def transfer_metric_roots(reference: Surface, roots: PointTensors, query_points: Points) -> PointTensors:
@@ -62,7 +63,7 @@ def transfer_metric_roots(reference: Surface, roots: PointTensors, query_points:
     if roots.shape != (reference.n_points, 3, 3):
         raise MetricError(f"roots has shape {roots.shape}; expected ({reference.n_points}, 3, 3)")
     facet, weights = closest_points(reference, query_points)
-    return np.einsum("nc,ncij->nij", weights, roots[reference.faces[facet]])
+    return np.asarray(np.einsum("nc,ncij->nij", weights, roots[reference.faces[facet]]))
 
 
 def closest_points(surface: Surface, query_points: Points) -> tuple[npt.NDArray[np.int64], npt.NDArray[np.float64]]:

@@ -1,4 +1,4 @@
-"""Is a remesh a valid surface of the same kind as its input?"""
+"""Whether a remesh is a valid surface of the same kind as its input."""
 
 from __future__ import annotations
 
@@ -135,4 +135,4 @@ def _corner_angles(surface: Surface) -> npt.NDArray[np.float64]:
     ahead = unit(corners[:, [1, 2, 0]] - corners)
     back = unit(corners[:, [2, 0, 1]] - corners)
     sine = np.linalg.norm(np.cross(ahead, back), axis=2)
-    return np.arctan2(sine, np.einsum("fcx,fcx->fc", ahead, back))
+    return np.asarray(np.arctan2(sine, np.einsum("fcx,fcx->fc", ahead, back)))

@@ -79,12 +79,12 @@ def principal_curvatures(surface: Surface, *, radius: int = 5) -> Curvature:
         raise OptionError(f"radius of the curvature fit is {radius}; expected at least 2 rings of edges")
     normals = unit_normals(surface)
     values, steepest = _fitted(surface, radius, normals)
-    fitted = np.isfinite(values).all(axis=1) & surface.point_normals.any(axis=1)
-    clear = fitted & steepest.any(axis=1)
+    fitted: PointMask = np.asarray(np.isfinite(values).all(axis=1) & surface.point_normals.any(axis=1))
+    clear: PointMask = np.asarray(fitted & steepest.any(axis=1))
     trusted = clear
     if not clear.all():
         rough_values, rough_steepest = _integrated(surface, normals)
-        trusted = clear | (fitted & (np.abs(rough_values[:, 1]) * surface.diagonal < _FLAT))
+        trusted = np.asarray(clear | (fitted & (np.abs(rough_values[:, 1]) * surface.diagonal < _FLAT)))
         values = np.where(clear[:, None], values, rough_values)
         steepest = np.where(clear[:, None], steepest, rough_steepest)
     return Curvature(
@@ -137,7 +137,7 @@ def _ring_sizes(surface: Surface, radius: int) -> npt.NDArray[np.int64]:
     reach = step
     for _ in range(radius - 1):
         reach = reach @ step
-    return np.diff(reach.indptr)
+    return np.asarray(np.diff(reach.indptr), dtype=np.int64)
 
 
 def _integrated(surface: Surface, normals: PointVectors) -> tuple[PointPairs, PointVectors]:

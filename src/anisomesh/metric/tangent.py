@@ -43,13 +43,13 @@ def line_field(directions: PointVectors, magnitude: npt.NDArray[np.float64], fra
 def line_directions(field: LineField, frames: Frames) -> PointVectors:
     """Return the unit direction (V, 3) of each line; the sign is arbitrary."""
     angle = 0.5 * np.angle(field)
-    return np.cos(angle)[:, None] * frames[:, 0] + np.sin(angle)[:, None] * frames[:, 1]
+    return np.asarray(np.cos(angle)[:, None] * frames[:, 0] + np.sin(angle)[:, None] * frames[:, 1])
 
 
 def line_tensors(field: LineField, frames: Frames) -> PointTensors:
     """Return the projector v v^t (V, 3, 3) on the direction v of each line."""
     directions = line_directions(field, frames)
-    return directions[:, :, None] * directions[:, None, :]
+    return np.asarray(directions[:, :, None] * directions[:, None, :])
 
 
 def one_ring_average(

@@ -117,7 +117,7 @@ def curvature_metric(
     low, high = _clamped(curvature, limits)
     _, line, frames = _smoothed_logarithm(surface, curvature, np.zeros_like(low), np.log(high / low), smoothing)
     stretch_squared = np.exp(np.abs(line))
-    return np.eye(3) + (stretch_squared - 1.0)[:, None, None] * line_tensors(line, frames)
+    return np.asarray(np.eye(3) + (stretch_squared - 1.0)[:, None, None] * line_tensors(line, frames))
 
 
 def approximation_metric(
@@ -160,7 +160,8 @@ def approximation_metric(
     )
     spread = np.abs(line)
     smaller, larger = np.exp(mean - 0.5 * spread), np.exp(mean + 0.5 * spread)
-    return smaller[:, None, None] * np.eye(3) + (larger - smaller)[:, None, None] * line_tensors(line, frames)
+    spherical = smaller[:, None, None] * np.eye(3)
+    return np.asarray(spherical + (larger - smaller)[:, None, None] * line_tensors(line, frames))
 
 
 def uniform_metric(surface: Surface) -> PointTensors:
@@ -237,7 +238,7 @@ def _smoothed_logarithm(
     return mean, line, frames
 
 
-def _refuse(bad: npt.NDArray[np.bool_], tensors: npt.NDArray[np.float64], what: str) -> None:
+def _refuse(bad: npt.ArrayLike, tensors: npt.NDArray[np.float64], what: str) -> None:
     where = np.flatnonzero(bad)
     if len(where):
         raise MetricError(

@@ -150,22 +150,17 @@ def settle(faces: Faces, pairs: Pairs) -> tuple[int, npt.NDArray[np.int32]]:
     Notes
     -----
     Two sheets can still share both ends of an edge, where a surface passes twice through the same edge and
-    the same fans. Such edges are cut open, and where that is not enough their faces are set apart, until no
-    edge has more than two faces; each round removes pairs, so this ends.
+    the same fans. Such edges are cut open. That is enough: a side that is not glued is an end of its fans, and
+    a fan has two ends, so that at most two such sides are left on an edge, and those run in opposite directions.
+    Cutting may split fans but never joins any, and each round removes pairs, so this ends.
     """
-    pairs = pairs.copy()
     while True:
         count, corner_point = topology.corner_fans(faces, pairs)
         face_edges = topology.edges_of(corner_point.reshape(-1, 3))[1].ravel()
         crowded = (np.bincount(face_edges) > 2)[face_edges]
         if not crowded.any():
             return count, corner_point
-        glued = crowded[pairs].any(axis=1)
-        if not glued.any():
-            bad_faces = np.zeros(len(faces), dtype=np.bool_)
-            bad_faces[np.flatnonzero(crowded) // 3] = True
-            glued = bad_faces[pairs // 3].any(axis=1)
-        pairs = pairs[~glued]
+        pairs = pairs[~crowded[pairs].any(axis=1)]
 
 
 def _twos(edges_at: npt.NDArray[np.int32], sides: Sides) -> tuple[Pairs, Sides]:
