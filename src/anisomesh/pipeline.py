@@ -15,13 +15,12 @@ from anisomesh.cvt.optimise import Optimised, lloyd, minimise
 from anisomesh.cvt.sampling import resample_by_energy, sample_surface
 from anisomesh.cvt.voronoi import RestrictedVoronoi
 from anisomesh.dual.refine import Refined, refine
-from anisomesh.embedding.base import Embedding
 from anisomesh.embedding.direct import embed
 from anisomesh.errors import MeshError, MetricError, OptionError
 from anisomesh.evaluation.validity import Validity, check_validity
-from anisomesh.metric.tensor import METRIC_NAMES, compute_metric
+from anisomesh.metric.tensor import METRIC_NAMES, MetricName, compute_metric
 from anisomesh.result import RemeshResult, save_rvd
-from anisomesh.surface.geometry import Frame, unit_frame
+from anisomesh.surface.geometry import unit_frame
 from anisomesh.surface.mesh import Surface
 from anisomesh.surface.prepare import Prepared, prepare
 from anisomesh.surface.subdivide import split_long_edges
@@ -65,7 +64,7 @@ class RemeshOptions:
 
     sharpness: float = 7.0
     final_sharpness: float | None = None
-    metric: str | npt.NDArray[Any] = "curvature"
+    metric: MetricName | npt.NDArray[Any] = "curvature"
     embedding: str = "direct"
     seed: int = 0
     threads: int = 2
@@ -160,19 +159,19 @@ def remesh(
         split = split_long_edges(unit, max_edge(unit, n), max_faces=max(MAX_GROWTH * unit.n_faces, MAX_SPLIT_FACES))
         working = split.surface
     with run.stage("metric"):
-        kind = options.metric
-        if not isinstance(kind, str):
-            kind = split.interpolate(_at_prepared(np.asarray(kind), given, prepared)) * frame.scale**2
-        metric = compute_metric(working, kind)
+        wanted = options.metric
+        if not isinstance(wanted, str):
+            wanted = split.interpolate(_at_prepared(np.asarray(wanted), given, prepared)) * frame.scale**2
+        metric = compute_metric(working, wanted)
     with run.stage("embed"):
         embedding = embed(working, metric.tensors)
     with run.stage("cvt"):
         voronoi = RestrictedVoronoi(embedding.points, working.faces, threads=options.threads)
         optimised = optimise(voronoi, n, options, run.on_step)
     with run.stage("dual"):
-        sharpness = options.final_sharpness or options.sharpness
-        refined = refine(voronoi, optimised.sites, Surface(working.points, voronoi.faces).face_neighbours, sharpness=sharpness)
-        surface = _in_model_units(refined, embedding, frame)
+        ordered = Surface(working.points, voronoi.faces)
+        refined = refine(voronoi, optimised.sites, ordered, embedding.scale, n)
+        surface = Surface(frame.to_model(refined.points), refined.faces)
         validity = check_validity(surface, prepared.surface)
     return RemeshResult(
         surface=surface,
@@ -188,6 +187,7 @@ def remesh(
         iterations=optimised.iterations,
         status=optimised.status,
         inserted=refined.inserted,
+        removed=refined.removed,
         validity=validity,
         seconds=run.total_seconds(),
         warnings=tuple(_warnings(n, surface, refined, validity)),
@@ -308,18 +308,14 @@ def _at_prepared(tensors: npt.NDArray[Any], given: Surface, prepared: Prepared) 
     return np.asarray(tensors[prepared.point_source], dtype=np.float64)
 
 
-def _in_model_units(refined: Refined, embedding: Embedding, frame: Frame) -> Surface:
-    return Surface(frame.to_model(refined.dual.points[:, :3] / embedding.scale), refined.dual.faces)
-
-
 def _warnings(n: int, surface: Surface, refined: Refined, validity: Validity) -> Iterator[str]:
-    if abs(surface.n_points - n) > COUNT_TOLERANCE * n:
+    if refined.from_input:
         yield (
-            f"{surface.n_points:,} vertices instead of {n:,}: {refined.inserted:,} were inserted, and "
-            f"{int((~refined.cells.alone).sum()):,} belong to cells in several parts, to keep the surface intact"
+            f"{n:,} vertices are too few for cells that are disks; the input itself was coarsened instead, and its "
+            "triangles do not follow the metric: ask for more vertices"
         )
-    if refined.defects.n:
-        yield f"{refined.defects.n:,} defects are left after {refined.rounds} rounds of refinement; ask for more vertices"
+    if abs(surface.n_points - n) > COUNT_TOLERANCE * n:
+        yield f"{surface.n_points:,} vertices instead of {n:,}: fewer would fold the surface or change its topology"
     if not validity.closed:
         yield "the surface is open: its boundary shrinks by about half a triangle"
     if validity.euler != validity.euler_input:

@@ -38,13 +38,13 @@ class RemeshResult:
     diagram
         The restricted Voronoi diagram whose dual the result is.
     cells
-        Its cell components; their numbers are those of the result's vertices.
+        Its cell components.
     vertices_asked
         The vertex count asked for.
     energy, iterations, status
         Of the optimisation: final energy at diagonal 1, iterations, why it stopped.
-    inserted
-        Sites that were added to make the mesh valid.
+    inserted, removed
+        Points that were added to make the mesh valid, and points taken away to keep to the number asked for.
     validity
         Checks of the result against the prepared input.
     seconds
@@ -66,6 +66,7 @@ class RemeshResult:
     iterations: int
     status: Status
     inserted: int
+    removed: int
     validity: Validity
     seconds: dict[str, float]
     warnings: tuple[str, ...]
@@ -81,6 +82,7 @@ class RemeshResult:
             "iterations": self.iterations,
             "status": self.status.value,
             "inserted": self.inserted,
+            "removed": self.removed,
             "stretch": {"mean": self.embedding.stretch.achieved_mean, "max": self.embedding.stretch.achieved_max},
             "validity": self.validity.as_dict(),
             "warnings": list(self.warnings),

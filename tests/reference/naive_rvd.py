@@ -5,6 +5,7 @@ decided in exact rational arithmetic; derivatives are taken by complex steps.
 """
 
 from fractions import Fraction
+from itertools import pairwise
 
 import numpy as np
 
@@ -47,8 +48,7 @@ def perturbed(rows, indices):
     """Return tables as exact numbers, each row raised by an infinitesimal that shrinks with its index."""
     rank = {index: k for k, index in enumerate(sorted(indices))}
     return [
-        [Fraction(float(w)) + TINY ** (rank[index] + 1) for w in row]
-        for row, index in zip(rows, indices, strict=True)
+        [Fraction(float(w)) + TINY ** (rank[index] + 1) for w in row] for row, index in zip(rows, indices, strict=True)
     ]
 
 
@@ -119,7 +119,7 @@ def polygons(points, faces, sites):
 def fraction(polygon):
     """Return the area of a polygon (n, 3) as a share of its facet."""
     following = np.roll(polygon, -1, axis=0)
-    return 0.5 * float((polygon[:, 0] * following[:, 1] - polygon[:, 1] * following[:, 0]).sum() * 2) / 1.0
+    return float((polygon[:, 0] * following[:, 1] - polygon[:, 1] * following[:, 0]).sum())
 
 
 def triangles(polygon):
@@ -209,7 +209,7 @@ def component_count_and_euler(diagram, tolerance=1e-9):
         places = np.concatenate(loops)
         number = np.argmax(np.linalg.norm(places[:, None] - places[None], axis=2) < tolerance, axis=1)
         start = np.cumsum([0] + [len(loop) for loop in loops])
-        numbered = [number[a:b].tolist() for a, b in zip(start[:-1], start[1:], strict=True)]
+        numbered = [number[a:b].tolist() for a, b in pairwise(start)]
         groups = []
         for loop in numbered:
             edges = {frozenset(pair) for pair in zip(loop, loop[1:] + loop[:1], strict=True)}

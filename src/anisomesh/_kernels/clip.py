@@ -180,19 +180,17 @@ def _cut(work, source, n, n_lost, first, j, size):
 
 
 @njit(cache=True, nogil=True, forceinline=True)
-def _measure(work, source, first, n, wa, wb, wc, sa, sb, sc, slack):
+def _measure(work, source, first, n, wa, wb, wc, sa, sb, sc, slack, spread):
     """Bound the squared distances of the vertices from ``first`` on; return the largest bound of all.
 
-    A vertex whose coordinates are wrong by e may be off by 2 e times the longest side. ``slack`` is for rounding.
+    ``slack`` is for the rounding of the squares, ``spread`` times its error for the place of the vertex.
     """
-    longest2 = max(sa, sb, sc)
     for m in range(first, n):
         la = work[source, m, 0]
         lb = work[source, m, 1]
         lc = work[source, m, 2]
         square = la * wa + lb * wb + lc * wc - (lb * lc * sa + lc * la * sb + la * lb * sc)
-        error = work[source, m, _ERROR]
-        work[source, m, _SQUARE] = square + slack + 2.0 * error * (square + slack + (1.0 + 2.0 * error) * longest2)
+        work[source, m, _SQUARE] = square + slack + spread * work[source, m, _ERROR]
     largest = 0.0
     for m in range(n):
         largest = max(largest, work[source, m, _SQUARE])
@@ -219,7 +217,21 @@ def clip_facet(facet, owner, facets, sites, ws):
     lists that are too short are noted in the workspace, all those on the facet at once.
     """
     positions, start, neighbours, distance2, complete = sites
-    clock, stamp, slot, candidate, table, queued, queue, polygon_slot, polygon_start, out_label, out_vertex, work, all_needed = ws
+    (
+        clock,
+        stamp,
+        slot,
+        candidate,
+        table,
+        queued,
+        queue,
+        polygon_slot,
+        polygon_start,
+        out_label,
+        out_vertex,
+        work,
+        all_needed,
+    ) = ws
     a, b, c = facets.faces[facet, 0], facets.faces[facet, 1], facets.faces[facet, 2]
     sa, sb, sc = facets.side2[facet, 0], facets.side2[facet, 1], facets.side2[facet, 2]
     points = facets.points
@@ -243,7 +255,11 @@ def clip_facet(facet, owner, facets, sites, ws):
         head += 1
         site = candidate[i]
         wa, wb, wc = table[i, 0], table[i, 1], table[i, 2]
+        # W and L being squares of the distance to the farthest corner and of the longest side, an error e <= 1
+        # of the coordinates moves a vertex by at most 2 e sqrt(L), and its squared distance, which is at most W,
+        # by at most 2 e (W + L) + 4 e^2 L
         slack = rounding * max(wa, wb, wc)
+        spread = 2.0 * (max(wa, wb, wc) + slack + 3.0 * max(sa, sb, sc))
         _whole_facet(work, wa, wb, wc, slack)
         radius2 = max(wa, wb, wc) + slack
         n = 3
@@ -279,7 +295,7 @@ def clip_facet(facet, owner, facets, sites, ws):
                 return BUFFER_TOO_SMALL
             n = _cut(work, source, n, n_lost, first, j, abs(fa) + abs(fb) + abs(fc))
             source = 1 - source
-            radius2 = _measure(work, source, n - 2, n, wa, wb, wc, sa, sb, sc, slack)
+            radius2 = _measure(work, source, n - 2, n, wa, wb, wc, sa, sb, sc, slack, spread)
         if n == 0:
             # only the start site can have no part of the facet; whatever took the last of it is tried next
             if n_polygons > 0 or queued[rival]:

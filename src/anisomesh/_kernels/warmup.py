@@ -13,16 +13,19 @@ _ENTRY_POINTS = (
     diagram.write_chunk,
     neighbours.refresh_lists,
     neighbours.displacements,
+    neighbours.limit_radius,
 )
 
 
 def kernels_cached() -> bool:
-    """Return whether compiled code of every kernel, newer than its source, is on disk."""
+    """Return whether compiled code of every kernel, newer than its source, is on disk or none is needed."""
+    if not hasattr(integrate.gather, "py_func"):  # compilation is switched off
+        return True
     newest = max(path.stat().st_mtime for path in Path(__file__).parent.glob("*.py"))
     for kernel in _ENTRY_POINTS:
         function = kernel.py_func
         pattern = f"{function.__module__.rsplit('.', 1)[-1]}.{function.__qualname__}-*.nbi"
-        indices = list(Path(kernel.stats.cache_path).glob(pattern))
+        indices = list(Path(kernel.stats.cache_path or "").glob(pattern))
         if not any(index.stat().st_mtime >= newest for index in indices):
             return False
     return True

@@ -67,6 +67,18 @@ class Diagram:
         return result
 
     @cached_property
+    def twin(self) -> npt.NDArray[np.int64]:
+        """The same segment as an edge of the polygon behind each bisector edge (Q,), -1 for other edges."""
+        edges = np.flatnonzero(self.label >= 0)
+        polygon = self.polygon_of[edges]
+        own, other = self.site[polygon].astype(np.int64), self.label[edges]
+        key = self.facet[polygon].astype(np.int64) * len(self.sites) + np.minimum(own, other)
+        edges = edges[np.argsort(key * len(self.sites) + np.maximum(own, other), kind="stable")]
+        result = np.full(len(self.label), -1, dtype=np.int64)
+        result[edges[0::2]], result[edges[1::2]] = edges[1::2], edges[0::2]
+        return result
+
+    @cached_property
     def positions(self) -> npt.NDArray[np.float64]:
         """Embedded positions of the vertices (Q, d)."""
         return self.at(self.facet[self.polygon_of], self.barycentric)
@@ -102,8 +114,8 @@ class DiagramPart(NamedTuple):
     @classmethod
     def empty(cls, n_polygons: int, n_vertices: int) -> DiagramPart:
         """Return room for this many polygons and vertices."""
-        polygon = [np.empty(n_polygons, dtype=np.int32) for _ in range(3)]
-        return cls(*polygon, np.empty(n_vertices, dtype=np.int32), np.empty((n_vertices, 3)))
+        facet, site, size = np.empty((3, n_polygons), dtype=np.int32)
+        return cls(facet, site, size, np.empty(n_vertices, dtype=np.int32), np.empty((n_vertices, 3)))
 
 
 def assemble(points: EmbeddedPoints, faces: Faces, sites: Sites, parts: list[DiagramPart]) -> Diagram:

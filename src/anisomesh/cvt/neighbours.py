@@ -38,6 +38,14 @@ class NeighbourLists:
 
     def __init__(self) -> None:
         self.n_sites = 0
+        self._anchors: Floats
+        self._moved: Floats
+        self._radius: Floats
+        self._distance2: Floats
+        self._counts: npt.NDArray[np.int64]
+        self._start: npt.NDArray[np.int64]
+        self._neighbours: npt.NDArray[np.int32]
+        self._typical = 0.0
         self._tree: cKDTree | None = None  # of the anchors
         self._current: cKDTree | None = None  # of the positions in the last call of table
 
@@ -65,7 +73,7 @@ class NeighbourLists:
         """
         short = np.flatnonzero(needed)
         wanted = _SPARE * needed[short] + self._moved[short] + self._farthest
-        old_start, old_counts = self._start, self._counts.copy()
+        old_counts = self._counts.copy()
         found: list[tuple[Rows, npt.NDArray[np.int32]]] = []
         while len(short):
             for count in np.unique(self._counts[short]):

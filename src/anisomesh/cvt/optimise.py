@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections import deque
 from collections.abc import Callable
 from dataclasses import dataclass
-from enum import Enum
+from enum import StrEnum
 
 import numpy as np
 import numpy.typing as npt
@@ -18,12 +18,12 @@ _WOLFE = 0.9
 _MAX_TRIALS = 12
 
 
-class Status(str, Enum):
+class Status(StrEnum):
     """Why an optimisation stopped."""
 
     CONVERGED = "converged"
     ITERATION_LIMIT = "iteration limit reached; raise max_iterations for a lower energy"
-    NO_DESCENT = "no step lowers the energy further: the limit of floating point"
+    NO_DESCENT = "no step lowers the energy further: a kink of the energy, or the limit of floating point"
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -40,9 +40,7 @@ class Optimised:
 Step = Callable[[int, float], None]
 
 
-def lloyd(
-    voronoi: RestrictedVoronoi, sites: Sites, iterations: int, on_step: Step | None = None
-) -> Sites:
+def lloyd(voronoi: RestrictedVoronoi, sites: Sites, iterations: int, on_step: Step | None = None) -> Sites:
     """Move every site to the centroid of its cell, a number of times; return the sites (S, d).
 
     A site with an empty cell (hidden by another at the same place) stays.
@@ -84,9 +82,9 @@ def minimise(
     memory
         Pairs of steps and gradient changes kept.
     tolerance
-        The optimisation has converged when the mass-weighted root mean square gradient falls below this share
-        of the square root of the mean energy, that is when no site would move by more than about that share
-        of its cell's radius.
+        The optimisation has converged when the root mean square, weighted by cell area, of the step gradient /
+        (2 area), which is Lloyd's for s = 1, falls below this share of the square root of energy / area: when the
+        sites would move by about that share of a cell's radius. It is tested before every iteration.
 
     Notes
     -----
@@ -94,6 +92,9 @@ def minimise(
     pair: for s = 1 and no pairs the step is Lloyd's. The line search accepts the weak Wolfe conditions by
     bisection (Lewis and Overton 2013), from step 1. All sums are NumPy's own, so the result does not depend
     on a threaded BLAS.
+
+    For s > 1 the energy has kinks where a cell boundary comes to lie along a mesh edge, because the normal jumps
+    there; on a surface that is coarse against the cells the optimisation can end in one, with a gradient left.
 
     References
     ----------
@@ -174,7 +175,7 @@ def _direction(here: Evaluation, pairs: deque[tuple[Sites, Sites, float]]) -> Si
 
 def _per_site(values: Sites, weights: npt.NDArray[np.float64]) -> Sites:
     """Divide rows (S, d) by weights (S,); rows of weight 0 become 0."""
-    return np.divide(values, weights[:, None], out=np.zeros_like(values), where=weights[:, None] > 0.0)
+    return np.asarray(np.divide(values, weights[:, None], out=np.zeros_like(values), where=weights[:, None] > 0.0))
 
 
 def _relative_gradient(here: Evaluation) -> float:

@@ -62,7 +62,7 @@ def resample_by_energy(voronoi: RestrictedVoronoi, sites: Sites, sharpness: floa
     instead of from an even sample halves the mean squared distance between surface and result.
     """
     evaluation = voronoi.evaluate(sites, sharpness)
-    density = np.sqrt(evaluation.cell_energy) / np.maximum(evaluation.mass, np.finfo(np.float64).tiny)
+    density = np.sqrt(np.maximum(evaluation.cell_energy, 0.0)) / np.maximum(evaluation.mass, np.finfo(np.float64).tiny)
     diagram = voronoi.diagram(sites)
     share = diagram.fractions * density[diagram.site]
     weights = np.bincount(diagram.facet, share, minlength=len(voronoi.faces)) * voronoi.facets.area

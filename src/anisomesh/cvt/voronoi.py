@@ -10,7 +10,7 @@ from typing import Any, TypeVar
 import numpy as np
 import numpy.typing as npt
 
-from anisomesh._arrays import EmbeddedPoints, Faces, SiteScalars, Sites
+from anisomesh._arrays import EmbeddedPoints, Faces, Sites, SiteScalars
 from anisomesh._kernels import clip, diagram, integrate
 from anisomesh.cvt.diagram import Diagram, DiagramPart, assemble
 from anisomesh.cvt.neighbours import NeighbourLists
@@ -66,7 +66,7 @@ class RestrictedVoronoi:
     def __init__(self, points: EmbeddedPoints, faces: Faces, *, threads: int = 2) -> None:
         if threads < 1:
             raise OptionError(f"threads = {threads}; expected at least 1")
-        self.points = np.ascontiguousarray(points, dtype=np.float64)
+        self.points = np.require(points, np.float64, ["C", "W"])
         self.order = _spatial_order(self.points[faces[:, :3], :3].mean(axis=1))
         self.faces = np.ascontiguousarray(faces[self.order], dtype=np.int32)
         self.facets = facet_table(self.points, self.faces)
@@ -102,7 +102,7 @@ class RestrictedVoronoi:
             part = (buffers.touched[:n].copy(), buffers.accumulated[:n].copy())
             return part, buffers.problems[:n_problems].copy()
 
-        self._prepare(sites)
+        sites = self._prepare(sites)
         gradient, mass, energy = np.zeros_like(sites), np.zeros(len(sites)), np.zeros(len(sites))
         for touched, accumulated in self._run(integrate_chunk, sites):
             integrate.gather(touched, accumulated, gradient, mass, energy)
@@ -121,10 +121,12 @@ class RestrictedVoronoi:
             diagram.write_chunk(good, self._owners, self.facets, self._table, buffers.workspace, *part)
             return part, problems
 
-        self._prepare(sites)
+        sites = self._prepare(sites)
         return assemble(self.points, self.faces, np.array(sites), self._run(write_chunk, sites))
 
-    def _prepare(self, sites: Sites) -> None:
+    def _prepare(self, sites: Sites) -> Sites:
+        # kernels are compiled anew for other types, orders and read-only arrays
+        sites = np.require(sites, np.float64, ["C", "W"])
         if sites.ndim != 2 or sites.shape[1] != self.points.shape[1] or len(sites) == 0:
             raise OptionError(f"sites has shape {sites.shape}; expected (S, {self.points.shape[1]}) with S >= 1")
         new = len(sites) != self._lists.n_sites
@@ -134,6 +136,7 @@ class RestrictedVoronoi:
             self._buffers = []
         while len(self._buffers) < self.threads:
             self._buffers.append(_Buffers(len(sites), sites.shape[1], self._size))
+        return sites
 
     def _run(self, work: Callable[[Chunk, _Buffers], tuple[_T, Problems]], sites: Sites) -> list[_T]:
         """Run the work on all facets by chunks, again on those with problems once the cause is mended."""
@@ -215,12 +218,12 @@ class _Buffers:
 def facet_table(points: EmbeddedPoints, faces: Faces) -> clip.Facets:
     """Return the arrays over facets that the kernels need."""
     corners = points[faces]
-    side2 = np.stack(
-        [((corners[:, (c + 1) % 3] - corners[:, (c + 2) % 3]) ** 2).sum(axis=1) for c in range(3)], axis=1
-    )
+    side2 = np.stack([((corners[:, (c + 1) % 3] - corners[:, (c + 2) % 3]) ** 2).sum(axis=1) for c in range(3)], axis=1)
     u, v = corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]
-    uu, uv, vv = (u * u).sum(axis=1), (u * v).sum(axis=1), (v * v).sum(axis=1)
-    area = 0.5 * np.sqrt(np.maximum(uu * vv - uv * uv, 0.0))
+    uu, uv = (u * u).sum(axis=1), (u * v).sum(axis=1)
+    along = np.divide(uv, uu, out=np.zeros_like(uv), where=uu > 0.0)
+    # not from uu vv - uv^2, which cancels on slivers
+    area = 0.5 * np.sqrt(uu) * np.linalg.norm(v - along[:, None] * u, axis=1)
     normal = geometry.unit(np.cross(u[:, :3], v[:, :3]))
     return clip.Facets(faces=faces, points=points, side2=side2, area=area, normal=normal)
 

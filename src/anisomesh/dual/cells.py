@@ -70,11 +70,11 @@ def cells_of(diagram: Diagram, face_neighbours: FaceIndices, face_areas: npt.NDA
     n = len(diagram.site)
     graph = coo_array((np.ones(len(there), dtype=np.int8), (here[inner], there)), shape=(n, n))
     _, labels = connected_components(graph, directed=False)
-    _, first, of_polygon = np.unique(labels, return_index=True, return_inverse=True)
+    _, first, inverse = np.unique(labels, return_index=True, return_inverse=True)
     rank = np.empty(len(first), dtype=np.int32)
     order = np.lexsort((first, diagram.site[first]))
     rank[order] = np.arange(len(first), dtype=np.int32)
-    of_polygon = rank[of_polygon]
+    of_polygon: Ints = rank[inverse]
     site = diagram.site[first][order]
     count = np.bincount(site, minlength=len(diagram.sites))
     area, centroid = _mass(diagram, of_polygon, len(site), face_areas)
@@ -96,7 +96,7 @@ def _mass(
     cross = here[:, 0] * there[:, 1] - here[:, 1] * there[:, 0]
     # triangles from barycentric corner c (0, 0, 1) to each edge: signed shares of area and of first moment
     third = np.array([0.0, 0.0, 1.0])
-    moment = np.stack(
+    moment: npt.NDArray[np.float64] = np.stack(
         [
             np.bincount(diagram.polygon_of, cross * (here[:, c] + there[:, c] + third[c]) / 3.0, len(diagram.site))
             for c in range(3)
@@ -104,7 +104,7 @@ def _mass(
         axis=1,
     )
     weight = face_areas[diagram.facet]
-    area = np.bincount(of_polygon, diagram.fractions * weight, minlength=n)
+    area = np.asarray(np.bincount(of_polygon, diagram.fractions * weight, minlength=n), dtype=np.float64)
     moved = diagram.at(diagram.facet, moment) * weight[:, None]
     total = np.stack([np.bincount(of_polygon, column, minlength=n) for column in moved.T], axis=1)
     centroid = diagram.sites[diagram.site[np.unique(of_polygon, return_index=True)[1]]].copy()
@@ -125,4 +125,4 @@ def _euler(diagram: Diagram, of_polygon: Ints, n: int, face_neighbours: FaceIndi
     edge = np.where(shared_after, 0.5, 1.0)
     component = of_polygon[diagram.polygon_of]
     euler = np.bincount(component, vertex - edge, minlength=n) + np.bincount(of_polygon, minlength=n)
-    return np.rint(euler).astype(np.int32)
+    return np.asarray(np.rint(euler), dtype=np.int32)

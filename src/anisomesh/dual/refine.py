@@ -1,48 +1,59 @@
-"""Refinement of the sites until the dual is a valid mesh."""
+"""From optimised sites to a valid mesh of the asked number of vertices."""
 
 from __future__ import annotations
 
 from dataclasses import dataclass
 
 import numpy as np
+import numpy.typing as npt
 
-from anisomesh._arrays import FaceIndices, Sites
+from anisomesh._arrays import EmbeddedPoints, Faces, Points, Sites
 from anisomesh.cvt.diagram import Diagram
-from anisomesh.cvt.optimise import minimise
 from anisomesh.cvt.voronoi import RestrictedVoronoi
 from anisomesh.dual.cells import Cells, cells_of
-from anisomesh.dual.defects import Defects, find_defects, insertion_points
-from anisomesh.dual.triangulate import Dual, dual_mesh
+from anisomesh.dual.decimate import decimate
+from anisomesh.dual.simplicial import simplicial_mesh
+from anisomesh.dual.triangulate import dual_mesh
+from anisomesh.dual.untangle import untangle
+from anisomesh.surface.closest import ClosestPoints
+from anisomesh.surface.mesh import Surface
 
-_SPACING = 0.02  # of the mean site distance: no site is inserted nearer to another
+MAX_ROUNDS = 10
+MAX_SHARE = 0.1  # of cells that are no disks; with more the sites are too few for this surface
 
 
 @dataclass(frozen=True, kw_only=True)
 class Refined:
-    """A dual, the sites and the diagram it comes from, and what the refinement did.
+    """A valid mesh and what it took.
 
-    ``inserted`` counts the sites added, ``defects`` tells what is left.
+    Attributes
+    ----------
+    points, faces
+        The mesh, in the space and units of the working surface.
+    diagram, cells
+        The restricted Voronoi diagram that it comes from.
+    inserted
+        Sites added because a cell was no disk, and points put on edges that were there twice.
+    removed
+        Points taken away again by edge collapses.
+    from_input
+        Whether the working surface itself was coarsened, because its embedding asks for many more sites.
+    turned
+        Triangles left that face away from the surface.
     """
 
-    sites: Sites
+    points: Points
+    faces: Faces
     diagram: Diagram
     cells: Cells
-    dual: Dual
     inserted: int
-    rounds: int
-    defects: Defects
+    removed: int
+    from_input: bool
+    turned: int
 
 
-def refine(
-    voronoi: RestrictedVoronoi,
-    sites: Sites,
-    face_neighbours: FaceIndices,
-    *,
-    sharpness: float,
-    max_rounds: int = 12,
-    iterations: int = 4,
-) -> Refined:
-    """Insert sites where the dual has a defect, re-optimise, repeat.
+def refine(voronoi: RestrictedVoronoi, sites: Sites, surface: Surface, scale: float, n_vertices: int) -> Refined:
+    """Return the dual of the diagram of these sites, made valid, with at most so many vertices where possible.
 
     Parameters
     ----------
@@ -50,44 +61,72 @@ def refine(
         The diagram over the embedded surface.
     sites
         Optimised positions (S, d).
-    face_neighbours
-        Face across each side (F, 3) of the faces of ``voronoi``.
-    sharpness
-        The factor s of the normal metric.
-    max_rounds
-        Bound on the number of rounds.
-    iterations
-        Optimiser iterations after each insertion.
+    surface
+        The surface in space, its faces in the order of ``voronoi``.
+    scale
+        The factor of the first three embedded coordinates.
+    n_vertices
+        Vertices asked for.
 
     Notes
     -----
-    A triangle turned against the surface, a tangled triangle and a cell that is no disk each ask for a site at
-    a vertex of the diagram, the centre of a ball without sites. No site is put nearer than a fixed distance to
-    another, so the number of insertions is bounded; the rounds are bounded besides, and what is left is
-    returned. In the limit of dense sites every cell is a disk and the dual is homeomorphic to the surface
-    (closed ball property, Edelsbrunner and Shah 1997).
+    1. While a cell is no disk, new sites go where it is farthest from its site; nothing else moves, so nothing
+       else breaks. Each new site is farther from all others than the radius of a disk-like cell, so this ends.
+    2. When all cells are disks the dual, glued along bisector chains, is homeomorphic to the surface (a regular
+       cell complex; compare the closed ball property of Edelsbrunner and Shah 1997). Points on edges that occur
+       twice make it a simplicial mesh.
+    3. What this inserted is taken away by edge collapses with the link condition, cheapest first.
+    4. Triangles that face away from the surface are turned back by edge flips and moves.
+
+    Where the sites are too few for step 1 (a tube thinner than their distance) the working surface itself, which
+    is valid, is coarsened by the same collapses. The paper inserts sites for every defect and optimises again;
+    that makes new defects as it mends old ones.
     """
-    spacing = _SPACING * float(np.sqrt(voronoi.facets.area.sum() / len(sites)))
     n_start = len(sites)
-    for round_ in range(max_rounds + 1):
+    for _ in range(MAX_ROUNDS):
         diagram = voronoi.diagram(sites)
-        cells = cells_of(diagram, face_neighbours, voronoi.facets.area)
-        dual = dual_mesh(diagram, cells)
-        defects = find_defects(diagram, cells, dual, voronoi.facets.normal)
-        if defects.n == 0 or round_ == max_rounds:
+        cells = cells_of(diagram, surface.face_neighbours, voronoi.facets.area)
+        bad = cells.euler != 1
+        if not bad.any() or bad.mean() > MAX_SHARE:
             break
-        new = insertion_points(diagram, cells, dual, defects, spacing)
-        if len(new) == 0:
-            break
-        sites = minimise(
-            voronoi, np.concatenate([sites, new]), sharpness=sharpness, max_iterations=iterations
-        ).sites
+        sites = np.concatenate([sites, _inside(diagram, cells, bad)])
+    from_input = bool(bad.any())
+    if from_input:
+        points, faces = voronoi.points, surface.faces
+    else:
+        points, faces, _ = simplicial_mesh(dual_mesh(diagram, cells, surface.face_edges))
+    inserted = max(len(points) - n_start, 0) if not from_input else 0
+    reference = ClosestPoints(surface)
+    space, faces, turned = untangle(points[:, :3] / scale, faces, reference)
+    if len(space) > n_vertices:
+        space, faces = decimate(space, faces, n_vertices, reference)
+        space, faces, turned = untangle(space, faces, reference)
     return Refined(
-        sites=sites,
+        points=space,
+        faces=faces,
         diagram=diagram,
         cells=cells,
-        dual=dual,
-        inserted=len(sites) - n_start,
-        rounds=round_,
-        defects=defects,
+        inserted=inserted,
+        removed=len(points) - len(space),
+        from_input=from_input,
+        turned=turned,
     )
+
+
+def _inside(diagram: Diagram, cells: Cells, bad: npt.NDArray[np.bool_]) -> EmbeddedPoints:
+    """Return two points of each bad cell: the farthest from its site, and the farthest from both (n, d)."""
+    component = cells.of_polygon[diagram.polygon_of]
+    vertex = np.flatnonzero(bad[component])
+    component = component[vertex]
+    position = diagram.positions[vertex]
+    centre = diagram.sites[diagram.site[diagram.polygon_of[vertex]]]
+    distance = np.linalg.norm(position - centre, axis=1)
+    chosen = []
+    for _ in range(2):
+        order = np.lexsort((-distance, component))
+        names, first = np.unique(component[order], return_index=True)
+        best = order[first]
+        chosen.append(position[best])
+        to_best = np.linalg.norm(position - position[best][np.searchsorted(names, component)], axis=1)
+        distance = np.minimum(distance, to_best)
+    return np.concatenate(chosen)

@@ -7,14 +7,15 @@ from dataclasses import dataclass
 import numpy as np
 import numpy.typing as npt
 
-from anisomesh._arrays import Faces, Points
+from anisomesh._arrays import FaceIndices, Faces, Points
 from anisomesh.cvt.diagram import Diagram
 from anisomesh.dual.cells import Cells
+from anisomesh.dual.chains import chains
 
 
 @dataclass(frozen=True, eq=False)
 class Dual:
-    """Triangles that join cell components.
+    """Triangles that join cell components, glued along chains of bisector segments.
 
     Attributes
     ----------
@@ -22,22 +23,36 @@ class Dual:
         One point per component (C, d) in the embedding.
     faces
         Components of each triangle (T, 3), oriented as the input facet in which they meet.
+    face_edges
+        The chain that each side, opposite corner 0, 1, 2, is dual to (T, 3). Triangles with a chain in common are
+        neighbours, even where another chain joins the same two components.
+    edge_points
+        A point of the embedded surface on every chain (K, d).
     vertex
         Vertex of the diagram that each triangle is dual to (T,).
     """
 
     points: Points
     faces: Faces
+    face_edges: FaceIndices
+    edge_points: Points
     vertex: npt.NDArray[np.int64]
 
 
-def dual_mesh(diagram: Diagram, cells: Cells) -> Dual:
+def dual_mesh(diagram: Diagram, cells: Cells, face_edges: FaceIndices) -> Dual:
     """Return the dual triangulation of a diagram.
 
     A triangle stands for every point where three cells meet, and joins the components that meet there, not
     the sites, so both sides of a thin sheet get vertices of their own. A component that is the whole cell of
     its site takes the position of the site, which the normal metric has drawn to the features; another takes
-    its centroid.
+    its centroid. When every cell is a disk the triangles, glued along chains, make up the surface again.
+
+    Parameters
+    ----------
+    diagram, cells
+        The diagram and the components of its cells.
+    face_edges
+        Mesh edge opposite each corner (F, 3) of the faces of the diagram.
 
     Notes
     -----
@@ -48,13 +63,26 @@ def dual_mesh(diagram: Diagram, cells: Cells) -> Dual:
     own = diagram.site[diagram.polygon_of]
     vertex = np.flatnonzero((before > own) & (after > own))
     facet = diagram.facet[diagram.polygon_of[vertex]]
-    polygons = np.stack(
-        [
-            diagram.polygon_of[vertex],
-            diagram.polygon_index(facet, before[vertex]),
-            diagram.polygon_index(facet, after[vertex]),
-        ],
-        axis=1,
+    second = diagram.polygon_index(facet, before[vertex])
+    third = diagram.polygon_index(facet, after[vertex])
+    polygons = np.stack([diagram.polygon_of[vertex], second, third], axis=1)
+    chain = chains(diagram, face_edges)
+    # around the vertex, the edge that arrives in the second polygon is the one between second and third
+    across = diagram.previous[diagram.twin[diagram.previous[vertex]]]
+    return Dual(
+        points=np.where(cells.alone[:, None], diagram.sites[cells.site], cells.centroid),
+        faces=cells.of_polygon[polygons].astype(np.int32),
+        face_edges=np.stack([chain[across], chain[vertex], chain[diagram.previous[vertex]]], axis=1),
+        edge_points=_chain_points(diagram, chain),
+        vertex=vertex,
     )
-    points = np.where(cells.alone[:, None], diagram.sites[cells.site], cells.centroid)
-    return Dual(points=points, faces=cells.of_polygon[polygons].astype(np.int32), vertex=vertex)
+
+
+def _chain_points(diagram: Diagram, chain: npt.NDArray[np.int32]) -> Points:
+    """Return the middle of the middle segment of every chain (K, d)."""
+    segments = np.flatnonzero(chain >= 0)
+    segments = segments[np.argsort(chain[segments], kind="stable")]
+    count = np.bincount(chain[segments])
+    middle = segments[np.cumsum(count) - count + count // 2]
+    facet = diagram.facet[diagram.polygon_of[middle]]
+    return diagram.at(facet, 0.5 * (diagram.barycentric[middle] + diagram.barycentric[diagram.following[middle]]))

@@ -5,11 +5,11 @@ from __future__ import annotations
 from dataclasses import asdict, dataclass
 from typing import Any
 
-import igl
 import numpy as np
 
 from anisomesh._arrays import Floats, Points
 from anisomesh.errors import OptionError
+from anisomesh.surface.closest import ClosestPoints
 from anisomesh.surface.mesh import Surface
 
 
@@ -92,8 +92,7 @@ def surface_distance(
 
 def squared_distances(points: Points, surface: Surface) -> Floats:
     """Return the squared distance (n,) of each point to the closest point of a surface."""
-    squared, _, _ = igl.point_mesh_squared_distance(points, surface.points, surface.faces.astype(np.int64))
-    return np.asarray(squared)
+    return ClosestPoints(surface).squared_distances(points)
 
 
 def sample_uniformly(surface: Surface, count: int, rng: np.random.Generator) -> Points:

@@ -2,12 +2,11 @@
 
 from __future__ import annotations
 
-import igl
 import numpy as np
-import numpy.typing as npt
 
 from anisomesh._arrays import Faces, FaceScalars, Points, PointTensors
 from anisomesh.errors import MetricError
+from anisomesh.surface.closest import ClosestPoints
 from anisomesh.surface.mesh import Surface
 
 
@@ -62,36 +61,5 @@ def transfer_metric_roots(reference: Surface, roots: PointTensors, query_points:
     """
     if roots.shape != (reference.n_points, 3, 3):
         raise MetricError(f"roots has shape {roots.shape}; expected ({reference.n_points}, 3, 3)")
-    facet, weights = closest_points(reference, query_points)
+    facet, weights = ClosestPoints(reference).locate(query_points)
     return np.asarray(np.einsum("nc,ncij->nij", weights, roots[reference.faces[facet]]))
-
-
-def closest_points(surface: Surface, query_points: Points) -> tuple[npt.NDArray[np.int64], npt.NDArray[np.float64]]:
-    """Return the facet (n,) and the barycentric coordinates in it (n, 3) of the closest point to each query."""
-    faces = surface.faces.astype(np.int64)
-    _, facet, closest = igl.point_mesh_squared_distance(
-        np.asarray(query_points, dtype=np.float64), surface.points, faces
-    )
-    facet = facet.astype(np.int64)
-    return facet, _barycentric(surface.points[surface.faces[facet]], closest)
-
-
-def _barycentric(corners: npt.NDArray[np.float64], points: Points) -> npt.NDArray[np.float64]:
-    """Return barycentric coordinates (n, 3) of points of triangles (n, 3, 3); on a flat one, along its longest side."""
-    sides = corners[:, [2, 0, 1]] - corners[:, [1, 2, 0]]
-    normal = np.cross(sides[:, 1], sides[:, 2])
-    squared = np.einsum("nx,nx->n", normal, normal)
-    longest_squared = np.einsum("ncx,ncx->nc", sides, sides)
-    to_corners = corners - points[:, None, :]
-    parts = np.cross(to_corners[:, [1, 2, 0]], to_corners[:, [2, 0, 1]])
-    weights = np.einsum("ncx,nx->nc", parts, normal)
-    flat = squared <= 1e-20 * longest_squared.max(axis=1) ** 2
-    weights = np.maximum(np.where(flat[:, None], 0.0, weights), 0.0)
-    rows = np.flatnonzero(flat)
-    side = np.argmax(longest_squared[rows], axis=1)
-    start, end = (side + 1) % 3, (side + 2) % 3
-    along = np.einsum("nx,nx->n", points[rows] - corners[rows, start], sides[rows, side])
-    length = longest_squared[rows, side]
-    share = np.clip(np.divide(along, length, out=np.zeros_like(along), where=length > 0.0), 0.0, 1.0)
-    weights[rows, start], weights[rows, end] = 1.0 - share, share
-    return np.asarray(weights / weights.sum(axis=1, keepdims=True))

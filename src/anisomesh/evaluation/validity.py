@@ -5,12 +5,8 @@ from __future__ import annotations
 from dataclasses import asdict, dataclass
 from typing import Any
 
-import numpy as np
-import numpy.typing as npt
-
-from anisomesh._arrays import FaceMask, FaceVectors
-from anisomesh.evaluation.quality import closest_points
-from anisomesh.surface.geometry import unit
+from anisomesh._arrays import FaceMask
+from anisomesh.surface.closest import ClosestPoints
 from anisomesh.surface.mesh import Surface
 from anisomesh.surface.topology import (
     boundary_loops,
@@ -20,8 +16,6 @@ from anisomesh.surface.topology import (
     euler_characteristic,
     is_oriented,
 )
-
-_ON_SIDE = 1e-6
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -100,39 +94,4 @@ def flipped_faces(result: Surface, reference: Surface) -> FaceMask:
     ----------
     Baerentzen, Aanaes, "Signed distance computation using the angle weighted pseudonormal", 2005.
     """
-    barycentres = result.points[result.faces].mean(axis=1)
-    facet, weights = closest_points(reference, barycentres)
-    normals = pseudo_normals(reference, facet, weights)
-    return np.asarray(np.einsum("fx,fx->f", result.face_normals, normals) < 0.0)
-
-
-def pseudo_normals(surface: Surface, facet: npt.NDArray[np.int64], weights: npt.NDArray[np.float64]) -> FaceVectors:
-    """Return the normals (n, 3), of any length, at points given by facet (n,) and barycentric coordinates (n, 3)."""
-    at_zero = weights < _ON_SIDE
-    normals = surface.face_normals[facet].copy()
-    on_edge = np.flatnonzero(at_zero.sum(axis=1) == 1)
-    if len(on_edge):
-        edge = surface.face_edges[facet[on_edge], np.argmax(at_zero[on_edge], axis=1)]
-        normals[on_edge] = _summed(surface.face_edges, np.ones((surface.n_faces, 3)), surface, len(surface.edges))[edge]
-    at_point = np.flatnonzero(at_zero.sum(axis=1) == 2)
-    if len(at_point):
-        point = surface.faces[facet[at_point], np.argmin(at_zero[at_point], axis=1)]
-        normals[at_point] = _summed(surface.faces, _corner_angles(surface), surface, surface.n_points)[point]
-    return normals
-
-
-def _summed(
-    target: npt.NDArray[np.int32], weight: npt.NDArray[np.float64], surface: Surface, size: int
-) -> npt.NDArray[np.float64]:
-    """Return the face normals summed over the edges or points (F, 3) of the faces, with weights (F, 3)."""
-    terms = weight[:, :, None] * surface.face_normals[:, None, :]
-    columns = [np.bincount(target.ravel(), terms[:, :, axis].ravel(), minlength=size) for axis in range(3)]
-    return np.stack(columns, axis=1)
-
-
-def _corner_angles(surface: Surface) -> npt.NDArray[np.float64]:
-    corners = surface.points[surface.faces]
-    ahead = unit(corners[:, [1, 2, 0]] - corners)
-    back = unit(corners[:, [2, 0, 1]] - corners)
-    sine = np.linalg.norm(np.cross(ahead, back), axis=2)
-    return np.asarray(np.arctan2(sine, np.einsum("fcx,fcx->fc", ahead, back)))
+    return ClosestPoints(reference).turned(result.points[result.faces])

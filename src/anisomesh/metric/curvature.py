@@ -9,15 +9,17 @@ import numpy as np
 import numpy.typing as npt
 from scipy import sparse
 
-from anisomesh._arrays import Faces, PointMask, PointVectors
+from anisomesh._arrays import Edges, Faces, PointMask, PointVectors
 from anisomesh.errors import OptionError
 from anisomesh.metric.tangent import tangent_frames, unit_normals
 from anisomesh.surface.geometry import unit
 from anisomesh.surface.mesh import Surface
-from anisomesh.surface.topology import connected_components
+from anisomesh.surface.topology import connected_components, edges_of
 
-_UNKNOWNS_AND_POINT = 6
-_RADIUS_THAT_REACHES_SIX = 5
+_NEEDLE = 1e-6
+_CANCELLED = 1e-5
+_UNCLEAR = 0.1
+_CHUNK = 1024
 _TANGENT = 0.1
 _FLAT = 1e-3
 
@@ -61,14 +63,14 @@ def principal_curvatures(surface: Surface, *, radius: int = 5) -> Curvature:
 
     Notes
     -----
-    libigl fits a quadric over the ``radius``-ring; its error falls with the square of the edge length. It
-    needs six points in every neighbourhood and ends the process when one has fewer, so it only sees faces with
-    three different corners, in components of six points or more, and with radius 5 (which reaches six points
-    in any such component) where a smaller one does not reach them. Elsewhere, and where the fit is not finite,
-    the shape operator is integrated from the normal curvatures of the edges at the point (Taubin), and
-    ``trusted`` is False. Points without faces have curvature 0. The fit gives no direction where a mesh is flat;
-    the rough estimate must then agree for the point to be trusted. Directions are projected to the plane of the
-    point normal. About 0.1 s for 6,000 points.
+    libigl fits a quadric over the ``radius``-ring, in a frame along the sum of the normals there; its error falls
+    with the square of the edge length. When that sum vanishes or is not a number, libigl reads out of bounds and
+    can end the process, so it does not see needle-like faces, nor a component in which the normals of some ring
+    cancel (such as a cube of 8 points, or sheets that are not oriented). Where fewer than six points are in reach,
+    or the normals nearly cancel, the shape operator is integrated from the normal curvatures of the edges at the
+    point (Taubin), and ``trusted`` is False. Points without faces have curvature 0. The fit gives no direction
+    where a mesh is flat; the rough estimate must then agree for the point to be trusted. Directions are projected
+    to the plane of the point normal. About 0.1 s for 6,000 points.
 
     References
     ----------
@@ -95,49 +97,56 @@ def principal_curvatures(surface: Surface, *, radius: int = 5) -> Curvature:
 def _fitted(surface: Surface, radius: int, normals: PointVectors) -> tuple[PointPairs, PointVectors]:
     """Return the curvatures sorted by magnitude (NaN without a fit) and the direction of the larger one, or zero."""
     values = np.full((surface.n_points, 2), np.nan)
-    steepest = np.full((surface.n_points, 3), np.nan)
-    for faces, rings in _fit_groups(surface, radius):
+    steepest = np.zeros((surface.n_points, 3))
+    faces, unclear = _fit_faces(surface, radius)
+    if len(faces):
         used, local = np.unique(faces, return_inverse=True)
-        along_1, along_2, k1, k2, _ = igl.principal_curvature(
-            surface.points[used], local.reshape(-1, 3).astype(np.int64), rings, True
+        along_1, along_2, k1, k2, starved = igl.principal_curvature(
+            surface.points[used], local.reshape(-1, 3).astype(np.int64), radius, True
         )
         second = np.abs(k2) > np.abs(k1)
         values[used] = np.where(second[:, None], np.stack([k1, k2], axis=1), np.stack([k2, k1], axis=1))
         steepest[used] = np.where(second[:, None], along_2, along_1)
+        values[used[np.asarray(starved, dtype=np.int64)]] = np.nan
+        values[unclear] = np.nan
     steepest = steepest - np.einsum("vx,vx->v", steepest, normals)[:, None] * normals
     clear = np.isfinite(values).all(axis=1) & (np.linalg.norm(steepest, axis=1) > _TANGENT)
     return values, unit(np.where(clear[:, None], steepest, 0.0))
 
 
-def _fit_groups(surface: Surface, radius: int) -> list[tuple[Faces, int]]:
-    """Split the faces that libigl may see into groups of components, each with the radius to use there."""
-    faces = surface.faces
-    faces = faces[(faces != np.roll(faces, 1, axis=1)).all(axis=1)]
+def _fit_faces(surface: Surface, radius: int) -> tuple[Faces, PointMask]:
+    """Return the faces that libigl may see, and at which points (V,) a fit would be arbitrary."""
+    unclear = np.zeros(surface.n_points, dtype=np.bool_)
+    longest = surface.edge_lengths[surface.face_edges].max(axis=1)
+    faces = surface.faces[2.0 * surface.face_areas > _NEEDLE * longest**2]
     if len(faces) == 0:
-        return []
-    count, face_label = connected_components(faces, surface.n_points)
-    label = np.full(surface.n_points, -1)
-    label[faces] = face_label[:, None]
-    large = np.bincount(label[label >= 0], minlength=count) >= _UNKNOWNS_AND_POINT
-    if radius >= _RADIUS_THAT_REACHES_SIX:
-        groups = [(large, radius)]
-    else:
-        starved = np.zeros(count, dtype=np.bool_)
-        starved[label[(label >= 0) & (_ring_sizes(surface, radius) < _UNKNOWNS_AND_POINT)]] = True
-        groups = [(large & ~starved, radius), (large & starved, _RADIUS_THAT_REACHES_SIX)]
-    return [(faces[chosen[face_label]], rings) for chosen, rings in groups if chosen[face_label].any()]
+        return faces, unclear
+    used, local = np.unique(faces, return_inverse=True)
+    local = local.reshape(-1, 3).astype(np.int32)
+    normals = igl.per_vertex_normals(surface.points[used], local.astype(np.int64))
+    agreement = _ring_agreement(normals, edges_of(local)[0], radius)
+    unclear[used] = ~(agreement > _UNCLEAR)
+    hazard = ~(agreement > _CANCELLED)
+    if hazard.any():
+        _, component = connected_components(local, len(used))
+        faces = faces[~np.isin(component, component[hazard[local].any(axis=1)])]
+    return faces, unclear
 
 
-def _ring_sizes(surface: Surface, radius: int) -> npt.NDArray[np.int64]:
-    """Return the number of points (V,) within this many edges of each point, the point included."""
-    rows, columns = np.concatenate([surface.edges, surface.edges[:, ::-1]]).T
-    size = surface.n_points
+def _ring_agreement(normals: PointVectors, edges: Edges, radius: int) -> npt.NDArray[np.float64]:
+    """Return the length of the mean normal (V,) over the points within this many edges of each point."""
+    size = len(normals)
+    rows, columns = np.concatenate([edges, edges[:, ::-1]]).T
     step = sparse.csr_matrix((np.ones(len(rows), dtype=np.bool_), (rows, columns)), shape=(size, size))
     step = step + sparse.identity(size, dtype=np.bool_, format="csr")
-    reach = step
-    for _ in range(radius - 1):
-        reach = reach @ step
-    return np.asarray(np.diff(reach.indptr), dtype=np.int64)
+    result = np.empty(size)
+    for start in range(0, size, _CHUNK):
+        reach = step[start : start + _CHUNK]
+        for _ in range(radius - 1):
+            reach = reach @ step
+        mean = (reach.astype(np.float64) @ normals) / np.diff(reach.indptr)[:, None]
+        result[start : start + _CHUNK] = np.linalg.norm(mean, axis=1)
+    return result
 
 
 def _integrated(surface: Surface, normals: PointVectors) -> tuple[PointPairs, PointVectors]:

@@ -1,0 +1,1 @@
+"""Triangle meshes: data, connectivity, files, repair, subdivision, samples."""

@@ -14,7 +14,7 @@ from anisomesh._arrays import Faces, FaceVectors, Points, PointVectors, Vector3
 def face_cross(points: Points, faces: Faces) -> FaceVectors:
     """Return the cross product of two sides of each face (F, 3): normal times twice the area."""
     a, b, c = points[faces[:, 0]], points[faces[:, 1]], points[faces[:, 2]]
-    return np.cross(b - a, c - a)
+    return np.asarray(np.cross(b - a, c - a))
 
 
 def unit(vectors: npt.NDArray[np.float64]) -> npt.NDArray[np.float64]:
@@ -27,10 +27,8 @@ def point_normals(points: Points, faces: Faces) -> PointVectors:
     """Return area-weighted unit normals (V, 3); zero at a point without faces."""
     cross = face_cross(points, faces)
     corners = faces.ravel()
-    normals = np.stack(
-        [np.bincount(corners, np.repeat(cross[:, axis], 3), minlength=len(points)) for axis in range(3)], axis=1
-    )
-    return unit(normals)
+    sums = [np.bincount(corners, np.repeat(cross[:, axis], 3), minlength=len(points)) for axis in range(3)]
+    return unit(np.stack(sums, axis=1).astype(np.float64))
 
 
 @dataclass(frozen=True)

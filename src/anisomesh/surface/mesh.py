@@ -95,7 +95,7 @@ class Surface:
     @cached_property
     def face_areas(self) -> FaceScalars:
         """Areas (F,) in model units squared."""
-        return 0.5 * np.linalg.norm(geometry.face_cross(self.points, self.faces), axis=1)
+        return np.asarray(0.5 * np.linalg.norm(geometry.face_cross(self.points, self.faces), axis=1))
 
     @cached_property
     def point_normals(self) -> PointVectors:
@@ -115,7 +115,7 @@ class Surface:
     @cached_property
     def edge_lengths(self) -> npt.NDArray[np.float64]:
         """Length of every edge (E,), in model units."""
-        return np.linalg.norm(self.points[self.edges[:, 0]] - self.points[self.edges[:, 1]], axis=1)
+        return np.asarray(np.linalg.norm(self.points[self.edges[:, 0]] - self.points[self.edges[:, 1]], axis=1))
 
     def with_points(self, points: npt.NDArray[Any]) -> Surface:
         """Return the same faces on other points (V, 3)."""

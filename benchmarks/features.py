@@ -1,0 +1,81 @@
+"""Corners and creases of the machine part made by code, and distances of rocker-arm and fertility.
+
+Usage: python benchmarks/features.py [--resolution 24]
+"""
+
+from __future__ import annotations
+
+import argparse
+import os
+from pathlib import Path
+
+import numpy as np
+from scipy.spatial import cKDTree
+
+import anisomesh
+from anisomesh.evaluation.distance import surface_distance
+from anisomesh.surface.geometry import unit_frame
+from anisomesh.surface.mesh import Surface
+from anisomesh.surface.shapes import cad_features, cad_part
+
+REACH = 0.1  # of the mean edge length: a point of a crease is covered if an edge of the result is so near
+BEND = np.radians(5.0)  # and its faces meet at such an angle at least
+
+
+def crease_points(surface: Surface, edges: np.ndarray, spacing: float) -> np.ndarray:
+    ends = surface.points[edges]
+    count = np.maximum(np.ceil(np.linalg.norm(ends[:, 1] - ends[:, 0], axis=1) / spacing), 1).astype(int)
+    which = np.repeat(np.arange(len(edges)), count)
+    share = (np.arange(len(which)) - np.repeat(np.cumsum(count) - count, count) + 0.5) / count[which]
+    return ends[which, 0] * (1 - share)[:, None] + ends[which, 1] * share[:, None]
+
+
+def bent_edges(surface: Surface) -> np.ndarray:
+    pairs = surface.edge_faces
+    cosine = np.einsum("ex,ex->e", surface.face_normals[pairs[:, 0]], surface.face_normals[pairs[:, 1]])
+    return surface.edges[cosine < np.cos(BEND)]
+
+
+def measure_part(resolution: int, ratio: float, final: float | None) -> str:
+    part, features = cad_part(resolution), cad_features(resolution)
+    result = anisomesh.remesh(part, ratio=ratio, final_sharpness=final).surface
+    edge = float(result.edge_lengths.mean())
+    corner = cKDTree(result.points).query(part.points[features.corners])[0] / edge
+    fine = cKDTree(crease_points(result, bent_edges(result), 0.02 * edge))
+    covered = []
+    for weak in (False, True):
+        chosen = features.creases[features.weak == weak]
+        distance = fine.query(crease_points(part, chosen, 0.1 * edge))[0]
+        covered.append(float((distance < REACH * edge).mean()))
+    late = "" if final is None else f", then s = {final:g}"
+    return (
+        f"| machine part, {part.n_points:,} points, {ratio:.0%}, s = 7{late} | {result.n_points:,} "
+        f"| {corner.max():.2%} | {covered[0]:.1%} | {covered[1]:.1%} |"
+    )
+
+
+def measure_mesh(path: Path, ratio: float) -> str:
+    result = anisomesh.remesh(anisomesh.load(path), ratio=ratio)
+    frame = unit_frame(result.prepared.points)
+    a = result.prepared.with_points(frame.to_unit(result.prepared.points))
+    distance = surface_distance(a, Surface(frame.to_unit(result.surface.points), result.surface.faces))
+    both = distance.mean_square_ab + distance.mean_square_ba
+    return f"| {path.stem}, {ratio:.0%} | {result.surface.n_points:,} | {distance.hausdorff:.2e} | {both:.2e} |"
+
+
+def main() -> None:
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("--resolution", type=int, default=24, help="edges of the part along a unit of length")
+    options = parser.parse_args()
+    print("| run | vertices | farthest corner / mean edge | sharp creases covered | weak creases covered |")
+    print("|---|---|---|---|---|")
+    for final in (None, 30.0):
+        print(measure_part(options.resolution, 0.2, final), flush=True)
+    if "ANISOMESH_DATA" in os.environ:
+        print("\n| run | vertices | largest distance | sum of both mean squared distances |\n|---|---|---|---|")
+        for name in ("rocker-arm", "fertility"):
+            print(measure_mesh(Path(os.environ["ANISOMESH_DATA"]) / "test" / f"{name}.ply", 0.2), flush=True)
+
+
+if __name__ == "__main__":
+    main()

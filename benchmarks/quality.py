@@ -1,0 +1,146 @@
+"""Quality, distance and validity of remeshes of real closed meshes.
+
+Usage: python benchmarks/quality.py [--ratios 1 0.2 0.1] [--sharpness 7 1] [--only NAME] [--fresh]
+"""
+
+from __future__ import annotations
+
+import argparse
+import csv
+import json
+import os
+import sys
+from collections import defaultdict
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+import anisomesh
+from anisomesh.evaluation.distance import surface_distance
+from anisomesh.evaluation.quality import anisotropic_quality, transfer_metric_roots
+from anisomesh.metric.tensor import compute_metric, metric_root
+from anisomesh.surface.geometry import unit_frame
+from anisomesh.surface.mesh import Surface
+from anisomesh.surface.topology import connected_components
+
+OUT = Path(__file__).parent / "out" / "quality.jsonl"
+
+
+def closed_meshes(data: Path) -> list[Path]:
+    with (data / "manifest.csv").open(newline="") as file:
+        rows = list(csv.DictReader(file))
+    return [
+        data / row["file"]
+        for row in rows
+        if row["file"].startswith("test/") and row["closed"] == "1" and row["manifold"] == "1"
+    ]
+
+
+def measure(path: Path, ratio: float, sharpness: float) -> dict[str, Any]:
+    result = anisomesh.remesh(anisomesh.load(path), ratio=ratio, sharpness=sharpness)
+    frame = unit_frame(result.prepared.points)
+    reference = result.prepared.with_points(frame.to_unit(result.prepared.points))
+    surface = Surface(frame.to_unit(result.surface.points), result.surface.faces)
+    roots = metric_root(compute_metric(reference).tensors)
+    quality = anisotropic_quality(
+        surface.points, surface.faces, transfer_metric_roots(reference, roots, surface.points)
+    )
+    distance = surface_distance(reference, surface)
+    n_components = connected_components(reference.faces, reference.n_points)[0]
+    return {
+        "mesh": path.stem,
+        "ratio": ratio,
+        "sharpness": sharpness,
+        "g_mean": float(quality.mean()),
+        "g_min": float(quality.min()),
+        "mean_square": distance.mean_square_ab + distance.mean_square_ba,
+        "hausdorff": distance.hausdorff,
+        "components_input": n_components,
+        **result.report(),
+    }
+
+
+def faults(row: dict[str, Any]) -> list[str]:
+    """Return what is wrong with a result, in words."""
+    validity = row["validity"]
+    found = [name for name in ("closed", "oriented") if not validity[name]]
+    found += [name for name in ("nonmanifold_edges", "nonmanifold_vertices", "flipped") if validity[name]]
+    if validity["euler"] != validity["euler_input"]:
+        found.append(f"euler {validity['euler']} for {validity['euler_input']}")
+    if validity["components"] != row["components_input"]:
+        found.append(f"components {validity['components']} for {row['components_input']}")
+    if abs(row["vertices"] - row["vertices_asked"]) > 0.02 * row["vertices_asked"]:
+        found.append(f"{row['vertices']} vertices for {row['vertices_asked']}")
+    return found
+
+
+def tables(rows: list[dict[str, Any]]) -> str:
+    groups: dict[tuple[float, float], list[dict[str, Any]]] = defaultdict(list)
+    for row in rows:
+        groups[row["sharpness"], row["ratio"]].append(row)
+    lines = [
+        "| s | vertices | meshes | G mean | G min of means | E2 x1e-7 | HD x1e-3 | seconds | faults |",
+        "|" + "---|" * 9,
+    ]
+    for (sharpness, ratio), group in sorted(groups.items(), reverse=True):
+        g = np.array([row["g_mean"] for row in group])
+        e2 = np.exp(np.mean(np.log([row["mean_square"] for row in group]))) * 1e7
+        hd = np.exp(np.mean(np.log([row["hausdorff"] for row in group]))) * 1e3
+        seconds = np.mean([row["seconds"]["total"] for row in group])
+        bad = sum(bool(faults(row)) for row in group)
+        lines.append(
+            f"| {sharpness:g} | {ratio:.0%} | {len(group)} | {g.mean():.3f} | {g.min():.3f} | {e2:.2f} | {hd:.2f} "
+            f"| {seconds:.2f} | {bad} |"
+        )
+    lines.append("")
+    lines += [
+        f"{row['mesh']} {row['ratio']:.0%} s={row['sharpness']:g}: {', '.join(faults(row))}"
+        for row in rows
+        if faults(row)
+    ]
+    return "\n".join(lines)
+
+
+def main() -> None:
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("--ratios", type=float, nargs="+", default=[1.0, 0.2, 0.1])
+    parser.add_argument("--sharpness", type=float, nargs="+", default=[7.0, 1.0])
+    parser.add_argument("--only", default="", help="part of the mesh names to run")
+    parser.add_argument("--fresh", action="store_true", help="forget earlier rows")
+    options = parser.parse_args()
+    if "ANISOMESH_DATA" not in os.environ:
+        sys.exit("set ANISOMESH_DATA to the folder of the meshes")
+    OUT.parent.mkdir(exist_ok=True)
+    if options.fresh:
+        OUT.unlink(missing_ok=True)
+    rows = [json.loads(line) for line in OUT.read_text().splitlines()] if OUT.exists() else []
+    done = {(row["mesh"], row["ratio"], row["sharpness"]) for row in rows}
+    todo = [
+        (path, ratio, sharpness)
+        for ratio in options.ratios
+        for sharpness in options.sharpness
+        for path in closed_meshes(Path(os.environ["ANISOMESH_DATA"]))
+        if options.only in path.name and (path.stem, ratio, sharpness) not in done
+    ]
+    for number, (path, ratio, sharpness) in enumerate(todo, 1):
+        try:
+            row = measure(path, ratio, sharpness)
+        except Exception as error:  # a crash is a result too
+            print(f"[{number}/{len(todo)}] {path.stem} {ratio:.0%} s={sharpness:g}: {error!r}", file=sys.stderr)
+            continue
+        rows.append(row)
+        with OUT.open("a") as file:
+            file.write(json.dumps(row) + "\n")
+        print(
+            f"[{number}/{len(todo)}] {path.stem[:28]:<28} {ratio:.0%} s={sharpness:g} G {row['g_mean']:.3f} "
+            f"E2 {row['mean_square'] * 1e7:.2f}e-7 HD {row['hausdorff'] * 1e3:.2f}e-3 {row['seconds']['total']:.2f} s "
+            f"{' '.join(faults(row))}",
+            file=sys.stderr,
+            flush=True,
+        )
+    print(tables(rows))
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,168 @@
+"""Turning back the triangles that face away from the surface: edge flips, moves of points, collapses."""
+
+from __future__ import annotations
+
+import numpy as np
+import numpy.typing as npt
+
+from anisomesh._arrays import Faces, Points
+from anisomesh.dual.decimate import collapsible_edges
+from anisomesh.surface.closest import ClosestPoints
+from anisomesh.surface.mesh import Surface
+
+MAX_ROUNDS = 60
+_LIFTS = (0.0, 0.1, 0.25, 0.5, 1.0)  # trial heights over an edge, in edge lengths
+
+Ints = npt.NDArray[np.int64]
+
+
+def untangle(points: Points, faces: Faces, reference: ClosestPoints) -> tuple[Points, Faces, int]:
+    """Mend triangles that face away from the reference, without changing the topology.
+
+    Parameters
+    ----------
+    points, faces
+        An oriented manifold mesh (V, 3), (F, 3).
+    reference
+        The surface that it stands for.
+
+    Returns
+    -------
+    points, faces, left
+        The mended mesh and the number of turned triangles left.
+
+    Notes
+    -----
+    In each round every turned triangle is given the flip of one of its edges, or else the move of one of its
+    points to the average of its neighbours (on the surface or not), or else the collapse of one of its edges, or
+    else a point on one of its edges, lifted to the side of the surface that the mesh is on there (on a thin sheet a
+    chord can come nearer to the other side). Taken is what leaves fewest turned triangles among those it changes,
+    and only if their number falls, so the rounds end.
+    """
+    for _ in range(MAX_ROUNDS):
+        surface = Surface(points, faces)
+        turned = reference.turned(points[faces])
+        if not turned.any():
+            return points, faces, 0
+        flipped = _flip(surface, turned, reference)
+        if flipped is not None:
+            faces = flipped
+            continue
+        moved = _move(surface, turned, reference)
+        if moved is not None:
+            points = moved
+            continue
+        changed = _collapse(surface, turned, reference) or _split(surface, turned, reference)
+        if changed is None:
+            break
+        points, faces = changed
+    return points, faces, int(reference.turned(points[faces]).sum())
+
+
+def _flip(surface: Surface, turned: npt.NDArray[np.bool_], reference: ClosestPoints) -> Faces | None:
+    """Return the faces after edge flips that leave fewer turned triangles, None if there is none."""
+    bad = np.flatnonzero(turned)
+    face, corner = np.repeat(bad, 3), np.tile(np.arange(3), len(bad))
+    other = surface.face_neighbours[face, corner].astype(np.int64)
+    face, corner, other = face[other >= 0], corner[other >= 0], other[other >= 0]
+    a, x, y = (surface.faces[face, (corner + k) % 3] for k in range(3))
+    b = surface.faces[other].sum(axis=1) - x - y
+    known = {(int(u), int(v)) for u, v in surface.edges}
+    ends = np.sort(np.stack([a, b], axis=1), axis=1).tolist()
+    new = np.array([u != v and (u, v) not in known for u, v in ends], dtype=bool)
+    face, other, a, b, x, y = (values[new] for values in (face, other, a, b, x, y))
+    pairs = np.stack([np.stack([a, x, b], axis=1), np.stack([a, b, y], axis=1)], axis=1)
+    corners = surface.points[pairs].reshape(-1, 3, 3)
+    after = reference.turned(corners).reshape(-1, 2).sum(axis=1)
+    before = turned[face].astype(int) + turned[other]
+    shape = _shape(corners).reshape(-1, 2).min(axis=1)
+    order = np.lexsort((-shape, after - before))
+    faces = surface.faces.copy()
+    used: set[int] = set()
+    for k in order[(after < before)[order]].tolist():
+        region = {int(face[k]), int(other[k]), *surface.face_neighbours[[face[k], other[k]]].ravel().tolist()}
+        edge = (min(int(a[k]), int(b[k])), max(int(a[k]), int(b[k])))
+        if not used & region and edge not in known:
+            used |= region
+            known.add(edge)
+            faces[face[k]], faces[other[k]] = pairs[k]
+    return faces if used else None
+
+
+def _move(surface: Surface, turned: npt.NDArray[np.bool_], reference: ClosestPoints) -> Points | None:
+    """Return the points after moves that leave fewer turned triangles, None if there is none."""
+    points = surface.points.copy()
+    faces_at: dict[int, list[int]] = {}
+    candidates = np.unique(surface.faces[turned])
+    for face in np.flatnonzero(np.isin(surface.faces, candidates).any(axis=1)).tolist():
+        for point in surface.faces[face].tolist():
+            faces_at.setdefault(point, []).append(face)
+    blocked: set[int] = set()
+    for point in candidates.tolist():
+        around = np.array(faces_at[point])
+        ring = np.setdiff1d(surface.faces[around], [point])
+        if blocked & {point, *ring.tolist()}:
+            continue
+        average = points[ring].mean(axis=0)
+        facet, weights = reference.locate(average[None])
+        on_surface = weights[0] @ reference.surface.points[reference.surface.faces[facet[0]]]
+        places = [on_surface, average, 0.5 * (average + points[point])]
+        at_point = (surface.faces[around] == point)[:, :, None]
+        trials = np.stack([np.where(at_point, place, points[surface.faces[around]]) for place in places])
+        count = reference.turned(trials.reshape(-1, 3, 3)).reshape(len(places), -1).sum(axis=1)
+        best = int(np.argmin(count))
+        if count[best] < turned[around].sum():
+            points[point] = places[best]
+            blocked |= {point, *ring.tolist()}
+    return points if blocked else None
+
+
+def _collapse(surface: Surface, turned: npt.NDArray[np.bool_], reference: ClosestPoints) -> tuple[Points, Faces] | None:
+    """Return the mesh after one collapse that leaves fewer turned triangles, None if there is none."""
+    edges = np.unique(surface.face_edges[turned])
+    edges = edges[collapsible_edges(surface)[edges] & (surface.edge_face_count[edges] == 2)]
+    best: tuple[int, Faces] | None = None
+    for gone, into in np.concatenate([surface.edges[edges], surface.edges[edges][:, ::-1]]).tolist():
+        around = (surface.faces == gone).any(axis=1)
+        changed = np.where(surface.faces[around] == gone, into, surface.faces[around])
+        changed = changed[(changed != np.roll(changed, 1, axis=1)).all(axis=1)]
+        gain = int(turned[around].sum() - reference.turned(surface.points[changed]).sum())
+        if gain > 0 and (best is None or gain > best[0]):
+            faces = np.concatenate([surface.faces[~around], changed]).astype(np.int32)
+            best = gain, (faces - (faces > gone)).astype(np.int32)
+            points = np.delete(surface.points, gone, axis=0)
+    return (points, best[1]) if best is not None else None
+
+
+def _split(surface: Surface, turned: npt.NDArray[np.bool_], reference: ClosestPoints) -> tuple[Points, Faces] | None:
+    """Return the mesh with one point more, on an edge, that leaves fewer turned triangles, None if there is none."""
+    best: tuple[int, Points, Faces] | None = None
+    for face in np.flatnonzero(turned).tolist():
+        for corner in range(3):
+            other = int(surface.face_neighbours[face, corner])
+            if other < 0:
+                continue
+            a, x, y = (int(surface.faces[face, (corner + k) % 3]) for k in range(3))
+            b = int(surface.faces[other].sum()) - x - y
+            middle = 0.5 * (surface.points[x] + surface.points[y])
+            out = surface.point_normals[x] + surface.point_normals[y]
+            reach = np.linalg.norm(surface.points[x] - surface.points[y]) / (np.linalg.norm(out) or 1.0)
+            facet, weights = reference.locate(middle + np.outer(_LIFTS, reach * out))
+            places = np.einsum("nc,ncx->nx", weights, reference.surface.points[reference.surface.faces[facet]])
+            m = surface.n_points
+            new = np.array([[a, x, m], [a, m, y], [b, y, m], [b, m, x]])
+            for place in places:
+                points = np.concatenate([surface.points, place[None]])
+                gain = int(turned[face]) + int(turned[other]) - int(reference.turned(points[new]).sum())
+                if gain > 0 and (best is None or gain > best[0]):
+                    faces = np.concatenate([np.delete(surface.faces, [face, other], axis=0), new]).astype(np.int32)
+                    best = gain, points, faces
+    return best[1:] if best is not None else None
+
+
+def _shape(corners: npt.NDArray[np.float64]) -> npt.NDArray[np.float64]:
+    """Return area over squared longest side of triangles (n, 3, 3)."""
+    sides = corners - corners[:, [1, 2, 0]]
+    area = 0.5 * np.linalg.norm(np.cross(sides[:, 0], sides[:, 1]), axis=1)
+    longest = (sides**2).sum(axis=2).max(axis=1)
+    return np.asarray(np.divide(area, longest, out=np.zeros_like(area), where=longest > 0.0))

@@ -1,0 +1,124 @@
+"""Closest points of a surface, and which way it faces there."""
+
+from __future__ import annotations
+
+from functools import cached_property
+
+import igl
+import numpy as np
+import numpy.typing as npt
+
+from anisomesh._arrays import FaceMask, FaceVectors, Points
+from anisomesh.surface.geometry import unit
+from anisomesh.surface.mesh import Surface
+
+_ON_SIDE = 1e-6
+
+Vectors = npt.NDArray[np.float64]
+Rows = npt.NDArray[np.int64]
+
+
+class ClosestPoints:
+    """A search tree over the facets of a surface, built once for many queries."""
+
+    def __init__(self, surface: Surface) -> None:
+        self.surface = surface
+        self._faces = surface.faces.astype(np.int64)
+        self._tree = igl.AABB()
+        self._tree.init(surface.points, self._faces)
+
+    def squared_distances(self, queries: Vectors) -> npt.NDArray[np.float64]:
+        """Return the squared distance (n,) of each point (n, 3) to the surface."""
+        return np.asarray(self._query(queries)[0])
+
+    def locate(self, queries: Vectors) -> tuple[Rows, Vectors]:
+        """Return facet (n,) and barycentric coordinates (n, 3) of the closest point to each point (n, 3)."""
+        _, facet, closest = self._query(queries)
+        return facet, barycentric(self.surface.points[self.surface.faces[facet]], closest)
+
+    def normals(self, queries: Vectors) -> FaceVectors:
+        """Return the normal of the surface at the closest point to each query (n, 3), of any length.
+
+        Inside a facet that is the facet's normal, on an edge the sum of the unit normals of the faces there, at a
+        point their sum weighted by the angles at the point.
+
+        References
+        ----------
+        Baerentzen, Aanaes, "Signed distance computation using the angle weighted pseudonormal", 2005.
+        """
+        return self.normals_at(*self.locate(queries))
+
+    def normals_at(self, facet: Rows, weights: Vectors) -> FaceVectors:
+        """Return the same for points given by facet (n,) and barycentric coordinates (n, 3)."""
+        at_zero = weights < _ON_SIDE
+        normals = self.surface.face_normals[facet].copy()
+        on_edge = np.flatnonzero(at_zero.sum(axis=1) == 1)
+        edge = self.surface.face_edges[facet[on_edge], np.argmax(at_zero[on_edge], axis=1)]
+        normals[on_edge] = self._edge_normals[edge]
+        at_point = np.flatnonzero(at_zero.sum(axis=1) == 2)
+        point = self.surface.faces[facet[at_point], np.argmin(at_zero[at_point], axis=1)]
+        normals[at_point] = self._point_normals[point]
+        return normals
+
+    def turned(self, corners: Vectors) -> FaceMask:
+        """Return which triangles (n, 3, 3) face away from the surface where it is closest to their barycentre.
+
+        A triangle without area is not turned.
+        """
+        normals = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
+        return np.asarray(np.einsum("nx,nx->n", normals, self.normals(corners.mean(axis=1))) < 0.0)
+
+    def _query(self, queries: Vectors) -> tuple[npt.NDArray[np.float64], Rows, Vectors]:
+        queries = np.ascontiguousarray(queries, dtype=np.float64).reshape(-1, 3)
+        if len(queries) == 0:
+            return np.zeros(0), np.zeros(0, dtype=np.int64), np.zeros((0, 3))
+        squared, facet, closest = self._tree.squared_distance(self.surface.points, self._faces, queries)
+        return np.asarray(squared), np.asarray(facet, dtype=np.int64), np.asarray(closest)
+
+    @cached_property
+    def _edge_normals(self) -> Vectors:
+        surface = self.surface
+        return _summed(surface.face_edges, np.ones((surface.n_faces, 3)), surface.face_normals, len(surface.edges))
+
+    @cached_property
+    def _point_normals(self) -> Vectors:
+        surface = self.surface
+        return _summed(surface.faces, _corner_angles(surface), surface.face_normals, surface.n_points)
+
+
+def barycentric(corners: npt.NDArray[np.float64], points: Points) -> npt.NDArray[np.float64]:
+    """Return barycentric coordinates (n, 3) of points of triangles (n, 3, 3); on a flat one, along its longest side."""
+    sides = corners[:, [2, 0, 1]] - corners[:, [1, 2, 0]]
+    normal = np.cross(sides[:, 1], sides[:, 2])
+    squared = np.einsum("nx,nx->n", normal, normal)
+    longest_squared = np.einsum("ncx,ncx->nc", sides, sides)
+    to_corners = corners - points[:, None, :]
+    parts = np.cross(to_corners[:, [1, 2, 0]], to_corners[:, [2, 0, 1]])
+    weights = np.einsum("ncx,nx->nc", parts, normal)
+    flat = squared <= 1e-20 * longest_squared.max(axis=1) ** 2
+    weights = np.maximum(np.where(flat[:, None], 0.0, weights), 0.0)
+    rows = np.flatnonzero(flat)
+    side = np.argmax(longest_squared[rows], axis=1)
+    start, end = (side + 1) % 3, (side + 2) % 3
+    along = np.einsum("nx,nx->n", points[rows] - corners[rows, start], sides[rows, side])
+    length = longest_squared[rows, side]
+    share = np.clip(np.divide(along, length, out=np.zeros_like(along), where=length > 0.0), 0.0, 1.0)
+    weights[rows, start], weights[rows, end] = 1.0 - share, share
+    return np.asarray(weights / weights.sum(axis=1, keepdims=True))
+
+
+def _summed(
+    target: npt.NDArray[np.int32], weight: npt.NDArray[np.float64], normals: Vectors, size: int
+) -> npt.NDArray[np.float64]:
+    """Return the face normals summed over the edges or points (F, 3) of the faces, with weights (F, 3)."""
+    terms = weight[:, :, None] * normals[:, None, :]
+    columns = [np.bincount(target.ravel(), terms[:, :, axis].ravel(), minlength=size) for axis in range(3)]
+    return np.stack(columns, axis=1)
+
+
+def _corner_angles(surface: Surface) -> npt.NDArray[np.float64]:
+    corners = surface.points[surface.faces]
+    ahead = unit(corners[:, [1, 2, 0]] - corners)
+    back = unit(corners[:, [2, 0, 1]] - corners)
+    sine = np.linalg.norm(np.cross(ahead, back), axis=2)
+    return np.asarray(np.arctan2(sine, np.einsum("fcx,fcx->fc", ahead, back)))

@@ -1,0 +1,66 @@
+"""Refinement: coarse samplings become valid meshes of about the number of vertices asked for."""
+
+import naive_rvd as naive
+import numpy as np
+import pytest
+from test_dual_mesh import assert_closed_manifold
+
+from anisomesh.cvt.optimise import lloyd
+from anisomesh.cvt.voronoi import RestrictedVoronoi
+from anisomesh.dual.cells import cells_of
+from anisomesh.dual.refine import refine
+from anisomesh.surface import shapes, topology
+from anisomesh.surface.mesh import Surface
+
+CASES = {
+    "torus": (lambda: shapes.torus(n_major=32, n_minor=14), 8),
+    "ring": (lambda: shapes.twisted_ring(n_major=60, n_section=(6, 3)), 12),
+    "part": (lambda: shapes.cad_part(5), 25),
+    "sheet": (lambda: shapes.box((1.0, 1.0, 0.02), n=8), 20),
+    "sphere": (lambda: shapes.sphere(2), 4),
+}
+
+
+def case(shape, n=None):
+    """Return diagram, sites and the surface with its faces in the order of the diagram."""
+    make, coarse = CASES[shape]
+    surface = make()
+    voronoi = RestrictedVoronoi(surface.points, surface.faces)
+    sites = naive.random_sites(surface.points, surface.faces, n or coarse, np.random.default_rng(0))
+    return voronoi, lloyd(voronoi, sites, 5), Surface(surface.points, voronoi.faces)
+
+
+@pytest.mark.parametrize("shape", CASES)
+@pytest.mark.parametrize("factor", [1, 6])
+def test_the_mesh_is_closed_with_the_topology_of_the_surface(shape, factor):
+    voronoi, sites, surface = case(shape, factor * CASES[shape][1])
+    result = refine(voronoi, sites, surface, 1.0, len(sites))
+    assert_closed_manifold(result.faces, topology.euler_characteristic(surface.faces))
+    assert len(np.unique(result.faces)) == len(result.points)
+    assert np.isfinite(result.points).all()
+    low, high = surface.points.min(axis=0), surface.points.max(axis=0)
+    assert np.all(result.points > low - 0.1 * surface.diagonal)
+    assert np.all(result.points < high + 0.1 * surface.diagonal)
+
+
+@pytest.mark.parametrize("shape", ["torus", "ring", "sheet"])
+def test_the_coarse_samplings_need_mending(shape):
+    voronoi, sites, surface = case(shape)
+    cells = cells_of(voronoi.diagram(sites), surface.face_neighbours, voronoi.facets.area)
+    assert np.any(cells.euler != 1) or not np.all(cells.alone)
+
+
+@pytest.mark.parametrize("shape", ["sphere", "torus"])
+def test_enough_sites_are_the_vertices_of_the_mesh(shape):
+    voronoi, sites, surface = case(shape, 200)
+    result = refine(voronoi, sites, surface, 1.0, len(sites))
+    assert (result.inserted, result.removed, result.turned, result.from_input) == (0, 0, 0, False)
+    np.testing.assert_array_equal(result.points, sites)
+
+
+def test_a_scaled_embedding_comes_back_to_space():
+    voronoi, sites, surface = case("sphere", 100)
+    scaled = RestrictedVoronoi(2.0 * voronoi.points, surface.faces)
+    ordered = Surface(surface.points, scaled.faces)
+    result = refine(scaled, 2.0 * sites, ordered, 2.0, len(sites))
+    np.testing.assert_allclose(np.linalg.norm(result.points, axis=1), 1.0, atol=0.1)

@@ -1,0 +1,56 @@
+"""Closest points and the normals there."""
+
+import numpy as np
+import pytest
+
+from anisomesh.surface.closest import ClosestPoints
+from anisomesh.surface.mesh import Surface
+from anisomesh.surface.shapes import box
+
+
+def wedge(angle):
+    """A roof of two long rectangles meeting at a crest with this opening angle, crest along y at the origin."""
+    run, drop = np.sin(angle / 2), -np.cos(angle / 2)
+    y = np.linspace(-1, 1, 9)
+    rows = [np.stack([np.full(9, x), y, np.full(9, z)], axis=1) for x, z in ((-run, drop), (0.0, 0.0), (run, drop))]
+    faces = []
+    for row in range(2):
+        for k in range(8):
+            a, b = 9 * row + k, 9 * (row + 1) + k
+            faces += [[a, b, b + 1], [a, b + 1, a + 1]]
+    return Surface(np.concatenate(rows), np.array(faces))
+
+
+def test_pseudo_normal_on_an_edge_is_the_sum_of_both_sides():
+    roof = wedge(np.radians(50))
+    facet = np.flatnonzero(np.isin(roof.faces, np.arange(9, 18)).sum(axis=1) == 2)
+    weights = np.where(np.isin(roof.faces[facet], np.arange(9, 18)), 0.5, 0.0)
+    normals = ClosestPoints(roof).normals_at(facet, weights)
+    inner = np.ptp(roof.points[roof.faces[facet]][:, :, 1], axis=1) > 0
+    np.testing.assert_allclose(
+        normals[inner] / np.linalg.norm(normals[inner], axis=1)[:, None],
+        np.tile([0.0, 0, 1], (int(inner.sum()), 1)),
+        atol=1e-9,
+    )
+
+
+@pytest.mark.parametrize("n", [1, 3])
+def test_pseudo_normal_at_a_corner_of_a_box_does_not_depend_on_its_triangles(n):
+    block = box(n=n)
+    corners = np.flatnonzero((np.abs(block.points - 0.5) == 0.5).all(axis=1))
+    assert len(corners) == 8
+    facet, column = np.array([np.argwhere(block.faces == corner)[0] for corner in corners]).T
+    normals = ClosestPoints(block).normals_at(facet, np.eye(3)[column])
+    normals /= np.linalg.norm(normals, axis=1)[:, None]
+    np.testing.assert_allclose(normals, (2 * block.points[corners] - 1) / np.sqrt(3), atol=1e-12)
+
+
+def test_closest_points_on_flat_facets_are_found_along_the_longest_side():
+    points = np.array([[0.0, 0, 0], [4, 0, 0], [1, 0, 0], [0, 5, 0]])
+    surface = Surface(points, np.array([[0, 1, 2], [3, 3, 3]]))
+    queries = np.array([[3.0, 0.5, 0], [0.5, 0, 1], [-2, 0, 0], [0, 5.5, 0]])
+    facet, weights = ClosestPoints(surface).locate(queries)
+    assert facet.tolist() == [0, 0, 0, 1]
+    found = np.einsum("nc,ncx->nx", weights, points[surface.faces[facet]])
+    np.testing.assert_allclose(found, [[3, 0, 0], [0.5, 0, 0], [0, 0, 0], [0, 5, 0]], atol=1e-12)
+    np.testing.assert_allclose(weights.sum(axis=1), 1.0)

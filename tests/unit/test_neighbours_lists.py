@@ -1,0 +1,83 @@
+"""Neighbour lists of moving sites: sorted, and complete within the radius they promise."""
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from anisomesh.cvt.neighbours import NeighbourLists
+
+
+def assert_lists_hold(table, sites):
+    """Every list is sorted, has true distances, no duplicates, and all sites within its complete radius."""
+    distance2 = ((sites[:, None] - sites[None]) ** 2).sum(axis=2)
+    for site in range(len(sites)):
+        listed = table.neighbours[table.start[site] : table.start[site + 1]]
+        promised = table.distance2[table.start[site] : table.start[site + 1]]
+        np.testing.assert_allclose(promised, distance2[site, listed], rtol=1e-12, atol=1e-300)
+        assert np.all(np.diff(promised) >= 0)
+        assert len(set(listed.tolist())) == len(listed)
+        assert site not in listed
+        near = np.flatnonzero(distance2[site] < max(table.complete[site], 0.0) ** 2 * (1 - 1e-12))
+        assert set(near.tolist()) - {site} <= set(listed.tolist())
+
+
+@settings(max_examples=25)
+@given(
+    st.integers(1, 120),
+    st.sampled_from([1, 2, 3, 8]),
+    st.lists(st.tuples(st.floats(-5, 0.5), st.sampled_from([0.03, 0.3, 1.0])), max_size=6),
+    st.integers(0, 2**32),
+    st.booleans(),
+)
+def test_lists_stay_complete_while_the_sites_move(n, dimension, moves, seed, duplicates):
+    rng = np.random.default_rng(seed)
+    sites = rng.random((n, dimension))
+    if duplicates:
+        sites = sites[rng.integers(max(1, n // 3), size=n)]
+    lists = NeighbourLists()
+    assert_lists_hold(lists.table(sites, 1), sites)
+    for size, share in moves:
+        chosen = rng.random(n) < share
+        sites = sites + 10.0**size * chosen[:, None] * rng.normal(size=sites.shape)
+        assert_lists_hold(lists.table(sites, 1), sites)
+        needed = np.where(rng.random(n) < 0.2, 2.0 * rng.random(n), 0.0)
+        table = lists.grow(sites, needed, 1)
+        assert np.all(table.complete[needed > 0] >= needed[needed > 0])
+        assert_lists_hold(table, sites)
+
+
+def test_number_of_sites_may_change():
+    rng = np.random.default_rng(0)
+    lists = NeighbourLists()
+    for n in (50, 3, 1, 200):
+        sites = rng.random((n, 3))
+        assert_lists_hold(lists.table(sites, 1), sites)
+
+
+def test_tied_neighbours_are_sorted_by_index():
+    sites = np.stack(np.meshgrid(*3 * [np.arange(4.0)]), axis=-1).reshape(-1, 3)
+    table = NeighbourLists().table(sites, 1)
+    for site in range(len(sites)):
+        part = slice(table.start[site], table.start[site + 1])
+        keys = list(zip(table.distance2[part].tolist(), table.neighbours[part].tolist(), strict=True))
+        assert keys == sorted(keys)
+
+
+@pytest.mark.parametrize("threads", [1, 2, 3])
+def test_lists_of_many_sites_do_not_depend_on_threads(threads):
+    rng = np.random.default_rng(1)
+    sites = rng.random((3500, 3))
+    tables = [NeighbourLists().table(sites, count) for count in (1, threads)]
+    np.testing.assert_array_equal(tables[0].neighbours, tables[1].neighbours)
+    np.testing.assert_array_equal(tables[0].distance2, tables[1].distance2)
+
+
+def test_nearest_is_the_nearest_site():
+    rng = np.random.default_rng(2)
+    lists = NeighbourLists()
+    for _ in range(2):
+        sites, queries = rng.random((40, 5)), rng.random((30, 5))
+        lists.table(sites, 1)
+        wanted = ((queries[:, None] - sites[None]) ** 2).sum(axis=2).argmin(axis=1)
+        np.testing.assert_array_equal(lists.nearest(queries, sites, 1), wanted)

@@ -1,0 +1,180 @@
+"""Lloyd's algorithm and L-BFGS: direction, descent, convergence."""
+
+from collections import deque
+
+import naive_rvd as naive
+import numpy as np
+import pytest
+
+from anisomesh.cvt import optimise
+from anisomesh.cvt.optimise import Status, lloyd, minimise
+from anisomesh.cvt.sampling import sample_surface
+from anisomesh.cvt.voronoi import Evaluation, RestrictedVoronoi
+from anisomesh.surface import shapes
+
+
+def start(n=40, seed=0, surface=None):
+    surface = surface or shapes.sphere(2)
+    voronoi = RestrictedVoronoi(surface.points, surface.faces)
+    return voronoi, naive.random_sites(surface.points, surface.faces, n, np.random.default_rng(seed))
+
+
+def fake(gradient, mass):
+    return Evaluation(energy=1.0, gradient=gradient, mass=mass, cell_energy=np.ones(len(mass)))
+
+
+@pytest.mark.parametrize("n_pairs", [0, 1, 2, 5])
+def test_direction_is_that_of_the_dense_recursion(n_pairs):
+    rng = np.random.default_rng(n_pairs)
+    n, d = 4, 3
+    mass = rng.uniform(0.5, 2.0, n)
+    root = rng.normal(size=(n * d, n * d))
+    hessian = root @ root.T + np.eye(n * d)
+    inverse = np.diag(np.repeat(1.0 / (2.0 * mass), d))
+    steps = rng.normal(size=(n_pairs, n * d))
+    if n_pairs:
+        change = hessian @ steps[-1]
+        inverse *= (change @ steps[-1]) / (change @ inverse @ change)
+    pairs = deque()
+    for step in steps:
+        change = hessian @ step
+        rho = 1.0 / (change @ step)
+        left = np.eye(n * d) - rho * np.outer(step, change)
+        inverse = left @ inverse @ left.T + rho * np.outer(step, step)
+        pairs.append((step.reshape(n, d), change.reshape(n, d), rho))
+    gradient = rng.normal(size=(n, d))
+    direction = optimise._direction(fake(gradient, mass), pairs)
+    np.testing.assert_allclose(direction.ravel(), -inverse @ gradient.ravel(), rtol=1e-10, atol=1e-12)
+    if n_pairs:
+        # the secant equation: the last change of gradient is taken back to the last step
+        last = optimise._direction(fake(pairs[-1][1], mass), pairs)
+        np.testing.assert_allclose(last, -pairs[-1][0], rtol=1e-9, atol=1e-10)
+
+
+def test_direction_without_pairs_is_the_step_of_lloyd():
+    voronoi, sites = start()
+    evaluation = voronoi.evaluate(sites, 1.0)
+    np.testing.assert_allclose(
+        sites + optimise._direction(evaluation, deque()), lloyd(voronoi, sites, 1), rtol=0, atol=1e-14
+    )
+
+
+def test_sites_with_empty_cells_stay():
+    voronoi, sites = start(20)
+    sites[3] = sites[7]
+    moved = lloyd(voronoi, sites, 1)
+    np.testing.assert_array_equal(moved[3], sites[3])
+    assert not np.array_equal(moved[7], sites[7])
+
+
+@pytest.mark.parametrize("seed", range(3))
+def test_lloyd_never_raises_the_plain_energy_and_moves_sites_to_centroids(seed):
+    voronoi, sites = start(seed=seed)
+    _, mass, moment = naive.energy(voronoi.points, voronoi.faces, sites, 1.0)
+    np.testing.assert_allclose(lloyd(voronoi, sites, 1), moment / mass[:, None], atol=1e-11)
+    energies = []
+    last = lloyd(voronoi, sites, 30, lambda iteration, energy: energies.append((iteration, energy)))
+    assert [iteration for iteration, _ in energies] == list(range(1, 31))
+    values = [energy for _, energy in energies] + [voronoi.evaluate(last).energy]
+    assert np.all(np.diff(values) <= 1e-12 * values[0])
+    assert values[-1] < 0.9 * values[0]
+
+
+@pytest.mark.parametrize(("sharpness", "tolerance"), [(1.0, 1e-5), (7.0, 1e-3)])
+def test_minimise_converges_to_a_point_without_gradient(sharpness, tolerance):
+    voronoi, sites = start(surface=shapes.sphere(4))
+    energies = []
+    result = minimise(
+        voronoi,
+        sites,
+        sharpness=sharpness,
+        max_iterations=2000,
+        tolerance=tolerance,
+        on_step=lambda iteration, energy: energies.append((iteration, energy)),
+    )
+    assert result.status is Status.CONVERGED
+    assert result.iterations == len(energies) == energies[-1][0]
+    assert result.evaluations > result.iterations
+    assert np.all(np.diff([voronoi.evaluate(sites, sharpness).energy, *(energy for _, energy in energies)]) < 0)
+    here = voronoi.evaluate(result.sites, sharpness)
+    assert here.energy == pytest.approx(result.energy, rel=1e-12)
+    step = here.gradient / (2 * here.mass[:, None])
+    mean_square = (here.mass * (step**2).sum(axis=1)).sum() / here.mass.sum()
+    assert np.sqrt(mean_square) < tolerance * np.sqrt(here.energy / here.mass.sum()) * (1 + 1e-6)
+
+
+def test_a_smaller_tolerance_takes_more_iterations_and_the_limit_is_reported():
+    voronoi, sites = start()
+    counts = [
+        minimise(voronoi, sites, sharpness=1.0, max_iterations=1000, tolerance=tolerance).iterations
+        for tolerance in (1e-1, 1e-2, 1e-4)
+    ]
+    assert counts[0] < counts[1] < counts[2]
+    few = minimise(voronoi, sites, sharpness=1.0, max_iterations=3)
+    assert few.status is Status.ITERATION_LIMIT
+    assert few.iterations == 3
+    none = minimise(voronoi, sites, sharpness=1.0, max_iterations=0)
+    np.testing.assert_array_equal(none.sites, sites)
+
+
+def test_an_impossible_tolerance_ends_without_descent_or_at_the_limit_and_never_raises_the_energy():
+    voronoi, sites = start(12)
+    result = minimise(voronoi, sites, sharpness=1.0, max_iterations=400, tolerance=0.0)
+    assert result.status is not Status.CONVERGED
+    reference = minimise(voronoi, sites, sharpness=1.0, max_iterations=400, tolerance=1e-6)
+    assert result.energy <= reference.energy * (1 + 1e-12)
+
+
+def test_where_no_step_descends_there_is_a_kink():
+    # On coarse facets the normal-metric energy is not smooth where a cell boundary lies along mesh edges.
+    voronoi, sites = start()
+    result = minimise(voronoi, sites, sharpness=7.0, max_iterations=3000, tolerance=1e-6)
+    assert result.status is Status.NO_DESCENT
+    here = voronoi.evaluate(result.sites, 7.0)
+    direction = -here.gradient / np.linalg.norm(here.gradient)
+    for step in 10.0 ** np.arange(-6, 0):
+        there = voronoi.evaluate(result.sites + step * direction, 7.0)
+        assert there.energy > here.energy
+        assert (there.gradient * direction).sum() > 0 > (here.gradient * direction).sum()
+
+
+def test_minimise_is_deterministic_for_any_number_of_threads():
+    surface = shapes.torus()
+    results = []
+    for threads in (1, 2, 2):
+        voronoi = RestrictedVoronoi(surface.points, surface.faces, threads=threads)
+        sites = naive.random_sites(surface.points, surface.faces, 200, np.random.default_rng(0))
+        results.append(minimise(voronoi, sites, sharpness=7.0, max_iterations=15))
+    for result in results[1:]:
+        np.testing.assert_array_equal(result.sites, results[0].sites)
+        assert result.energy == results[0].energy
+
+
+def test_lbfgs_beats_lloyd_for_as_many_evaluations():
+    voronoi, sites = start(60)
+    result = minimise(voronoi, sites, sharpness=1.0, max_iterations=40)
+    assert result.energy < voronoi.evaluate(lloyd(voronoi, sites, result.evaluations)).energy * (1 + 1e-3)
+
+
+def test_cells_on_a_sphere_come_out_about_equal():
+    surface = shapes.sphere(4)
+    voronoi = RestrictedVoronoi(surface.points, surface.faces)
+    sites = sample_surface(surface.points, voronoi.faces, voronoi.facets.area, 120, np.random.default_rng(0))
+    result = minimise(voronoi, sites, sharpness=1.0, max_iterations=200)
+    mass = voronoi.evaluate(result.sites).mass
+    assert mass.std() < 0.06 * mass.mean()
+    assert voronoi.evaluate(sites).mass.std() > 0.3 * mass.mean()
+
+
+def test_a_sharp_metric_draws_sites_onto_the_creases_of_a_box():
+    surface = shapes.box(n=6)
+    voronoi = RestrictedVoronoi(surface.points, surface.faces)
+    sites = naive.random_sites(surface.points, surface.faces, 150, np.random.default_rng(0))
+    sites = lloyd(voronoi, sites, 10)
+
+    def near_crease(x):
+        to_planes = np.sort(np.abs(x - np.round(x)), axis=1)
+        return np.mean(to_planes[:, 1] < 0.02)
+
+    plain, sharp = (minimise(voronoi, sites, sharpness=s, max_iterations=80).sites for s in (1.0, 7.0))
+    assert near_crease(sharp) > near_crease(plain) + 0.1
