@@ -14,6 +14,7 @@ import numpy.typing as npt
 from anisomesh.cvt.optimise import Optimised, lloyd, minimise
 from anisomesh.cvt.sampling import resample_by_energy, sample_surface
 from anisomesh.cvt.voronoi import RestrictedVoronoi
+from anisomesh.dual.exchange import exchange_sites
 from anisomesh.dual.refine import Refined, refine
 from anisomesh.embedding.direct import embed
 from anisomesh.errors import MeshError, MetricError, OptionError
@@ -31,6 +32,7 @@ MIN_VERTICES = 4
 COUNT_TOLERANCE = 0.02  # share of the asked vertices by which the result may differ without a warning
 FINE_POINTS = 5_000  # the working surface has edges no longer than an even mesh of so many points
 EDGE_FACTOR = 1.6  # and no longer than this many distances between sites
+EXCHANGE_AT = 0.6  # share of the iterations after which sites are exchanged
 DENSITY_SHARPNESS = 4.0  # sharpness of the energy that sites are distributed by, over that of the optimisation
 MAX_GROWTH = 8  # splitting makes at most so many times the faces, or MAX_SPLIT_FACES
 MAX_SPLIT_FACES = 60_000
@@ -60,6 +62,9 @@ class RemeshOptions:
         Iterations of Lloyd's algorithm at the start and bound on those of L-BFGS after it.
     weld_tolerance
         Points of the input up to this distance (model units) become one.
+    crease_angle
+        Where the normals in a cell spread by more than this many degrees its vertex goes to where its planes meet,
+        onto the crease or corner; 180 for nowhere. The plain CVT (``sharpness`` 1) never does.
     """
 
     sharpness: float = 7.0
@@ -71,6 +76,7 @@ class RemeshOptions:
     lloyd_iterations: int = 9
     max_iterations: int = 100
     weld_tolerance: float = 0.0
+    crease_angle: float = 40.0
 
     def __post_init__(self) -> None:
         for name in ("sharpness", "final_sharpness"):
@@ -81,6 +87,8 @@ class RemeshOptions:
             raise OptionError(f"metric = {self.metric!r}; expected one of {', '.join(METRIC_NAMES)}, or tensors")
         if self.embedding != "direct":
             raise OptionError(f"embedding = {self.embedding!r}; expected 'direct'")
+        if not 0.0 <= self.crease_angle <= 180.0:
+            raise OptionError(f"crease_angle = {self.crease_angle}; expected 0 to 180 degrees")
         for name, low in (("seed", 0), ("threads", 1), ("lloyd_iterations", 0), ("max_iterations", 0)):
             if getattr(self, name) < low:
                 raise OptionError(f"{name} = {getattr(self, name)}; expected at least {low}")
@@ -167,10 +175,11 @@ def remesh(
         embedding = embed(working, metric.tensors)
     with run.stage("cvt"):
         voronoi = RestrictedVoronoi(embedding.points, working.faces, threads=options.threads)
-        optimised = optimise(voronoi, n, options, run.on_step)
-    with run.stage("dual"):
         ordered = Surface(working.points, voronoi.faces)
-        refined = refine(voronoi, optimised.sites, ordered, embedding.scale, n)
+        optimised = optimise(voronoi, n, ordered, embedding.scale, options, run.on_step)
+    with run.stage("dual"):
+        angle = options.crease_angle if options.sharpness > 1.0 else 180.0
+        refined = refine(voronoi, optimised.sites, ordered, embedding.scale, n_vertices=n, crease_angle=angle)
         surface = Surface(frame.to_model(refined.points), refined.faces)
         validity = check_validity(surface, prepared.surface)
     return RemeshResult(
@@ -227,11 +236,13 @@ def max_edge(surface: Surface, n_vertices: int) -> float:
     return min(EDGE_FACTOR * _even_edge(surface.area, n_vertices), 2.0 * _even_edge(surface.area, FINE_POINTS))
 
 
-def optimise(voronoi: RestrictedVoronoi, n: int, options: RemeshOptions, on_step: OnStep) -> Optimised:
+def optimise(
+    voronoi: RestrictedVoronoi, n: int, surface: Surface, scale: float, options: RemeshOptions, on_step: OnStep
+) -> Optimised:
     """Return n optimised sites: a random start, Lloyd's algorithm, then L-BFGS on the normal-metric energy.
 
-    With a normal metric the sites are drawn anew half-way through Lloyd's algorithm, denser where the surface bends
-    within a cell.
+    With a normal metric the sites are drawn anew within Lloyd's algorithm, denser where the surface bends within a
+    cell, and a few of them are exchanged within L-BFGS, for points that the dual would miss.
     """
     late = options.max_iterations // 2 if options.final_sharpness is not None else 0
     total = options.lloyd_iterations + options.max_iterations + late
@@ -249,16 +260,22 @@ def optimise(voronoi: RestrictedVoronoi, n: int, options: RemeshOptions, on_step
         sites = resample_by_energy(voronoi, sites, DENSITY_SHARPNESS * options.sharpness, rng)
     sites = lloyd(voronoi, sites, options.lloyd_iterations - first, report)
     done += options.lloyd_iterations - first
-    result = minimise(
-        voronoi, sites, sharpness=options.sharpness, max_iterations=options.max_iterations, on_step=report
-    )
-    if options.final_sharpness is None:
-        return result
-    done += options.max_iterations
-    last = minimise(voronoi, result.sites, sharpness=options.final_sharpness, max_iterations=late, on_step=report)
-    return replace(
-        last, iterations=result.iterations + last.iterations, evaluations=result.evaluations + last.evaluations
-    )
+    schedule = [(options.sharpness, options.max_iterations)]
+    if options.sharpness > 1.0:
+        before = round(EXCHANGE_AT * options.max_iterations)
+        schedule = [(options.sharpness, before), (options.sharpness, options.max_iterations - before)]
+    if options.final_sharpness is not None:
+        schedule.append((options.final_sharpness, late))
+    iterations = evaluations = 0
+    for stage, (sharpness, limit) in enumerate(schedule):
+        if stage == 1 and options.sharpness > 1.0:
+            sites = exchange_sites(voronoi, sites, surface, scale, sharpness)
+        result = minimise(voronoi, sites, sharpness=sharpness, max_iterations=limit, on_step=report)
+        sites = result.sites
+        done += limit
+        iterations += result.iterations
+        evaluations += result.evaluations
+    return replace(result, iterations=iterations, evaluations=evaluations)
 
 
 class _Run:

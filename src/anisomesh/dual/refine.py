@@ -12,6 +12,7 @@ from anisomesh.cvt.diagram import Diagram
 from anisomesh.cvt.voronoi import RestrictedVoronoi
 from anisomesh.dual.cells import Cells, cells_of
 from anisomesh.dual.decimate import decimate
+from anisomesh.dual.place import crease_positions
 from anisomesh.dual.simplicial import simplicial_mesh
 from anisomesh.dual.triangulate import dual_mesh
 from anisomesh.dual.untangle import untangle
@@ -52,7 +53,15 @@ class Refined:
     turned: int
 
 
-def refine(voronoi: RestrictedVoronoi, sites: Sites, surface: Surface, scale: float, n_vertices: int) -> Refined:
+def refine(
+    voronoi: RestrictedVoronoi,
+    sites: Sites,
+    surface: Surface,
+    scale: float,
+    *,
+    n_vertices: int,
+    crease_angle: float,
+) -> Refined:
     """Return the dual of the diagram of these sites, made valid, with at most so many vertices where possible.
 
     Parameters
@@ -67,6 +76,8 @@ def refine(voronoi: RestrictedVoronoi, sites: Sites, surface: Surface, scale: fl
         The factor of the first three embedded coordinates.
     n_vertices
         Vertices asked for.
+    crease_angle
+        Cells whose normals spread by more than this many degrees get their vertex where their planes meet.
 
     Notes
     -----
@@ -95,6 +106,8 @@ def refine(voronoi: RestrictedVoronoi, sites: Sites, surface: Surface, scale: fl
         points, faces = voronoi.points, surface.faces
     else:
         points, faces, _ = simplicial_mesh(dual_mesh(diagram, cells, surface.face_edges))
+        creased, places = crease_positions(voronoi, diagram, cells, scale, crease_angle)
+        points[creased, :3] = scale * places
     inserted = max(len(points) - n_start, 0) if not from_input else 0
     reference = ClosestPoints(surface)
     space, faces, turned = untangle(points[:, :3] / scale, faces, reference)

@@ -1,0 +1,72 @@
+"""Moving sites from where they matter least to where the dual is farthest from the surface."""
+
+from __future__ import annotations
+
+import numpy as np
+import numpy.typing as npt
+from scipy.spatial import cKDTree
+
+from anisomesh._arrays import Sites
+from anisomesh.cvt.voronoi import RestrictedVoronoi
+from anisomesh.dual.cells import cells_of
+from anisomesh.dual.triangulate import dual_mesh
+from anisomesh.surface.closest import ClosestPoints
+from anisomesh.surface.mesh import Surface
+
+_SHARE = 0.02  # of the sites, at most, that are exchanged
+_WORTH = 4.0  # a point is missed if its squared distance is that many times the mean
+_POOL = 20  # candidates looked at per site exchanged
+
+
+def exchange_sites(voronoi: RestrictedVoronoi, sites: Sites, surface: Surface, scale: float, sharpness: float) -> Sites:
+    """Return as many sites (S, d), some of them moved to points of the surface that the dual misses.
+
+    Parameters
+    ----------
+    voronoi
+        The diagram over the embedded surface.
+    sites
+        Optimised positions (S, d).
+    surface
+        The surface in space, its faces in the order of ``voronoi``.
+    scale
+        The factor of the first three embedded coordinates.
+    sharpness
+        The factor s of the normal metric of the energy by which the least important sites are found.
+
+    Notes
+    -----
+    Descent of the energy moves sites within their neighbourhood; a corner or the end of a crease that no site has
+    come near stays missed. New sites are points of the surface that are farthest from the dual, no two in one
+    cell; the sites of lowest energy, no two of them neighbours, go.
+    """
+    diagram = voronoi.diagram(sites)
+    cells = cells_of(diagram, surface.face_neighbours, voronoi.facets.area)
+    dual = dual_mesh(diagram, cells, surface.face_edges)
+    if len(dual.faces) == 0:
+        return sites
+    squared = ClosestPoints(Surface(dual.points[:, :3] / scale, dual.faces)).squared_distances(surface.points)
+    spacing = float(np.sqrt(voronoi.facets.area.sum() / len(sites)))
+    n = max(1, int(_SHARE * len(sites)))
+    new = _spaced(voronoi.points, np.argsort(-squared, kind="stable"), n, spacing)
+    new = new[squared[new] > _WORTH * squared.mean()]
+    energy = voronoi.evaluate(sites, sharpness).cell_energy
+    old = _spaced(sites, np.argsort(energy, kind="stable"), len(new), 2.0 * spacing)
+    return np.concatenate([np.delete(sites, old, axis=0), voronoi.points[new[: len(old)]]])
+
+
+def _spaced(
+    positions: npt.NDArray[np.float64], order: npt.NDArray[np.int64], n: int, distance: float
+) -> npt.NDArray[np.int64]:
+    """Return the first n of the positions (m, d), in an order of preference, that are so far apart."""
+    pool = order[: _POOL * n]
+    tree = cKDTree(positions[pool])
+    blocked = np.zeros(len(pool), dtype=bool)
+    chosen: list[int] = []
+    for k in range(len(pool)):
+        if len(chosen) == n:
+            break
+        if not blocked[k]:
+            chosen.append(k)
+            blocked[tree.query_ball_point(positions[pool[k]], distance)] = True
+    return np.asarray(pool[np.array(chosen, dtype=np.int64)])
