@@ -268,7 +268,7 @@ def optimise(
         schedule.append((options.final_sharpness, late))
     iterations = evaluations = 0
     for stage, (sharpness, limit) in enumerate(schedule):
-        if stage == 1 and options.sharpness > 1.0:
+        if stage > 0 and options.sharpness > 1.0:
             sites = exchange_sites(voronoi, sites, surface, scale, sharpness)
         result = minimise(voronoi, sites, sharpness=sharpness, max_iterations=limit, on_step=report)
         sites = result.sites

@@ -30,11 +30,16 @@ def case(shape, n=None):
     return voronoi, lloyd(voronoi, sites, 5), Surface(surface.points, voronoi.faces)
 
 
+def mended(voronoi, sites, surface, scale=1.0, crease_angle=180.0):
+    return refine(voronoi, sites, surface, scale, n_vertices=len(sites), crease_angle=crease_angle)
+
+
+@pytest.mark.parametrize("crease_angle", [30.0, 180.0])
 @pytest.mark.parametrize("shape", CASES)
 @pytest.mark.parametrize("factor", [1, 6])
-def test_the_mesh_is_closed_with_the_topology_of_the_surface(shape, factor):
+def test_the_mesh_is_closed_with_the_topology_of_the_surface(shape, factor, crease_angle):
     voronoi, sites, surface = case(shape, factor * CASES[shape][1])
-    result = refine(voronoi, sites, surface, 1.0, len(sites))
+    result = mended(voronoi, sites, surface, crease_angle=crease_angle)
     assert_closed_manifold(result.faces, topology.euler_characteristic(surface.faces))
     assert len(np.unique(result.faces)) == len(result.points)
     assert np.isfinite(result.points).all()
@@ -53,7 +58,7 @@ def test_the_coarse_samplings_need_mending(shape):
 @pytest.mark.parametrize("shape", ["sphere", "torus"])
 def test_enough_sites_are_the_vertices_of_the_mesh(shape):
     voronoi, sites, surface = case(shape, 200)
-    result = refine(voronoi, sites, surface, 1.0, len(sites))
+    result = mended(voronoi, sites, surface)
     assert (result.inserted, result.removed, result.turned, result.from_input) == (0, 0, 0, False)
     np.testing.assert_array_equal(result.points, sites)
 
@@ -62,5 +67,5 @@ def test_a_scaled_embedding_comes_back_to_space():
     voronoi, sites, surface = case("sphere", 100)
     scaled = RestrictedVoronoi(2.0 * voronoi.points, surface.faces)
     ordered = Surface(surface.points, scaled.faces)
-    result = refine(scaled, 2.0 * sites, ordered, 2.0, len(sites))
+    result = mended(scaled, 2.0 * sites, ordered, scale=2.0)
     np.testing.assert_allclose(np.linalg.norm(result.points, axis=1), 1.0, atol=0.1)

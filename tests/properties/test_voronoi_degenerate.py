@@ -58,15 +58,15 @@ def test_special_sites_with_duplicates_give_a_consistent_diagram(surface, n, see
     assert cells.area.sum() == pytest.approx(surface.area, rel=1e-12)
 
 
-@settings(max_examples=40)
-@given(st.sampled_from(SHAPES), st.integers(1, 60), st.integers(0, 2**32), st.floats(-17, -8))
-def test_sites_within_rounding_of_special_points_never_break_the_diagram(surface, n, seed, exponent):
+@pytest.mark.parametrize("seed", range(20))
+def test_many_sites_within_rounding_of_special_points_never_break_the_diagram(seed):
     # Regression: the security radius ignored rounding, so that facets disagreed or could not be clipped.
     rng = np.random.default_rng(seed)
+    surface = shapes.box(n=2)
     special = special_points(surface)
-    sites = special[rng.integers(len(special), size=n)] + 10.0**exponent * rng.normal(size=(n, 3))
+    sites = special[rng.integers(len(special), size=300)] + 10.0 ** rng.uniform(-17, -6) * rng.normal(size=(300, 3))
     _, cells = diagram_and_cells(surface, sites)
-    assert len(np.unique(cells.site)) <= n
+    assert cells.area.min() > -1e-12
 
 
 def test_the_highest_of_equal_sites_owns_their_common_cell():

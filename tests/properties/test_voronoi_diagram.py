@@ -198,8 +198,9 @@ def test_many_more_sites_than_facets(dimension):
 
 
 @pytest.mark.parametrize("dimension", [3, 8])
-@pytest.mark.parametrize("scale", [1e-3, 1e-6, 1e-9])
+@pytest.mark.parametrize("scale", [1e-3, 1e-6, 1e-8, 1e-9])
 def test_clustered_sites(dimension, scale):
+    # Regression: next to the rounding of squared distances the security radius was too small.
     rng = np.random.default_rng(6)
     surface = shapes.torus(n_major=9, n_minor=5)
     points = naive.embed(surface.points, dimension, rng)
@@ -213,7 +214,7 @@ def test_clustered_sites(dimension, scale):
 @settings(max_examples=25)
 @given(st.integers(0, 2**32), st.sampled_from([3, 6, 8]), st.integers(100, 400))
 def test_sites_at_all_scales_around_one_point(seed, dimension, n):
-    # Regression: next to rounding of the squared distances the security radius was too small.
+    # Regression: as above.
     rng = np.random.default_rng(seed)
     surface = shapes.torus(n_major=8, n_minor=5)
     points = naive.embed(surface.points, dimension, rng)

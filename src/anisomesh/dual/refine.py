@@ -12,7 +12,7 @@ from anisomesh.cvt.diagram import Diagram
 from anisomesh.cvt.voronoi import RestrictedVoronoi
 from anisomesh.dual.cells import Cells, cells_of
 from anisomesh.dual.decimate import decimate
-from anisomesh.dual.place import crease_positions
+from anisomesh.dual.place import crease_positions, snap_to_missed
 from anisomesh.dual.simplicial import simplicial_mesh
 from anisomesh.dual.triangulate import dual_mesh
 from anisomesh.dual.untangle import untangle
@@ -108,6 +108,7 @@ def refine(
         points, faces, _ = simplicial_mesh(dual_mesh(diagram, cells, surface.face_edges))
         creased, places = crease_positions(voronoi, diagram, cells, scale, crease_angle)
         points[creased, :3] = scale * places
+        points[:, :3] = scale * snap_to_missed(diagram, cells, surface, points[:, :3] / scale, faces, creased)
     inserted = max(len(points) - n_start, 0) if not from_input else 0
     reference = ClosestPoints(surface)
     space, faces, turned = untangle(points[:, :3] / scale, faces, reference)

@@ -20,7 +20,7 @@ def face_cross(points: Points, faces: Faces) -> FaceVectors:
 def unit(vectors: npt.NDArray[np.float64]) -> npt.NDArray[np.float64]:
     """Return the vectors (..., d) divided by their length; zero vectors stay zero."""
     length = np.linalg.norm(vectors, axis=-1, keepdims=True)
-    return np.divide(vectors, length, out=np.zeros_like(vectors), where=length > 0)
+    return np.asarray(np.divide(vectors, length, out=np.zeros_like(vectors), where=length > 0))
 
 
 def point_normals(points: Points, faces: Faces) -> PointVectors:
