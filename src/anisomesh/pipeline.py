@@ -63,8 +63,8 @@ class RemeshOptions:
     weld_tolerance
         Points of the input up to this distance (model units) become one.
     crease_angle
-        Where the normals in a cell spread by more than this many degrees its vertex goes to where its planes meet,
-        onto the crease or corner; 180 for nowhere. The plain CVT (``sharpness`` 1) never does.
+        Edges of the input whose faces differ by more than this many degrees are creases, onto which the vertices of
+        their cells are put; 180 for none. The plain CVT (``sharpness`` 1) has none.
     """
 
     sharpness: float = 7.0
@@ -76,7 +76,7 @@ class RemeshOptions:
     lloyd_iterations: int = 9
     max_iterations: int = 100
     weld_tolerance: float = 0.0
-    crease_angle: float = 40.0
+    crease_angle: float = 30.0
 
     def __post_init__(self) -> None:
         for name in ("sharpness", "final_sharpness"):

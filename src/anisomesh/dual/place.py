@@ -9,17 +9,48 @@ from anisomesh._arrays import Faces, Points
 from anisomesh.cvt.diagram import Diagram
 from anisomesh.cvt.voronoi import RestrictedVoronoi
 from anisomesh.dual.cells import Cells
+from anisomesh.surface import geometry
 from anisomesh.surface.closest import ClosestPoints
 from anisomesh.surface.mesh import Surface
 
 _SHARPNESS = 100.0
+_TURN = 45.0  # degrees by which a crease turns at a corner
 _MISSED = 0.05  # mean edge lengths between a corner and the mesh, from which on it counts as missed
 
 
+def sharp_edges(surface: Surface, angle: float) -> npt.NDArray[np.bool_]:
+    """Return which edges (E,) have faces whose normals differ by more than an angle in degrees."""
+    first, second = surface.edge_faces.T
+    cosine = np.einsum("ex,ex->e", surface.face_normals[first], surface.face_normals[second])
+    return np.asarray((second >= 0) & (cosine < np.cos(np.radians(angle))))
+
+
+def corners(surface: Surface, sharp: npt.NDArray[np.bool_]) -> npt.NDArray[np.bool_]:
+    """Return which points (V,) are ends of sharp edges but not of two that go on in about the same direction."""
+    ends = surface.edges[sharp]
+    along = geometry.unit(surface.points[ends[:, 1]] - surface.points[ends[:, 0]])
+    count = np.bincount(ends.ravel(), minlength=surface.n_points)
+    outward = np.zeros((surface.n_points, 3))
+    np.add.at(outward, ends[:, 0], along)
+    np.add.at(outward, ends[:, 1], -along)
+    straight = (count == 2) & (np.linalg.norm(outward, axis=1) < 2.0 * np.sin(np.radians(_TURN) / 2.0))
+    return np.asarray((count > 0) & ~straight)
+
+
+def creased_cells(
+    diagram: Diagram, cells: Cells, surface: Surface, sharp: npt.NDArray[np.bool_]
+) -> npt.NDArray[np.int64]:
+    """Return the cells (n,) that hold a piece of a sharp edge; ``surface`` has its faces in the diagram's order."""
+    on_side = np.flatnonzero(diagram.label < 0)
+    polygon = diagram.polygon_of[on_side]
+    edge = surface.face_edges[diagram.facet[polygon], -1 - diagram.label[on_side]]
+    return np.unique(cells.of_polygon[polygon[sharp[edge]]]).astype(np.int64)
+
+
 def crease_positions(
-    voronoi: RestrictedVoronoi, diagram: Diagram, cells: Cells, scale: float, angle: float
-) -> tuple[npt.NDArray[np.int64], Points]:
-    """Return the cells whose normals spread by more than an angle, and where the planes in each of them meet.
+    voronoi: RestrictedVoronoi, diagram: Diagram, cells: Cells, scale: float, chosen: npt.NDArray[np.int64]
+) -> Points:
+    """Return where the planes in each of the chosen cells meet (n, 3).
 
     Parameters
     ----------
@@ -27,13 +58,8 @@ def crease_positions(
         The embedded surface, the diagram on it, and the components of its cells.
     scale
         The factor of the first three embedded coordinates.
-    angle
-        Degrees from the mean normal of a cell to the farthest of its normals.
-
-    Returns
-    -------
-    cells, points
-        Numbers of the cells (n,) and positions in space (n, 3).
+    chosen
+        Numbers of the cells (n,), those with a crease.
 
     Notes
     -----
@@ -46,20 +72,13 @@ def crease_positions(
     normal = voronoi.facets.normal[diagram.facet]
     corner = diagram.points[diagram.faces[diagram.facet, 0], :3] / scale
     height = np.einsum("px,px->p", normal, corner)
-    mean = _per_cell(cells, area[:, None] * normal)
-    length = np.linalg.norm(mean, axis=1)
-    cosine = np.einsum("px,px->p", normal, mean[cells.of_polygon])
-    spread = np.full(len(cells.site), np.inf)
-    np.minimum.at(spread, cells.of_polygon, cosine)
-    chosen = np.flatnonzero(spread < length * np.cos(np.radians(angle)))
     quadric = _per_cell(cells, area[:, None, None] * normal[:, :, None] * normal[:, None, :])[chosen]
     pull = _per_cell(cells, (area * height)[:, None] * normal)[chosen]
-    mass = cells.area[chosen]
+    mass = np.maximum(cells.area[chosen], np.finfo(np.float64).tiny)
     factor = _SHARPNESS**2 - 1.0
     matrix = mass[:, None, None] * np.eye(3) + factor * quadric
     right = mass[:, None] * cells.centroid[chosen, :3] / scale + factor * pull
-    positive = mass > 0.0
-    return chosen[positive], np.linalg.solve(matrix[positive], right[positive][:, :, None])[:, :, 0]
+    return np.asarray(np.linalg.solve(matrix, right[:, :, None])[:, :, 0])
 
 
 def _per_cell(cells: Cells, values: npt.NDArray[np.float64]) -> npt.NDArray[np.float64]:
@@ -70,9 +89,9 @@ def _per_cell(cells: Cells, values: npt.NDArray[np.float64]) -> npt.NDArray[np.f
 
 
 def snap_to_missed(
-    diagram: Diagram, cells: Cells, surface: Surface, points: Points, faces: Faces, creased: npt.NDArray[np.int64]
+    diagram: Diagram, cells: Cells, surface: Surface, points: Points, faces: Faces, sharp: npt.NDArray[np.bool_]
 ) -> Points:
-    """Return the points (V, 3) with those of creased cells moved to the corner they miss.
+    """Return the points (V, 3), some of them moved to corners that the mesh misses.
 
     Parameters
     ----------
@@ -82,14 +101,14 @@ def snap_to_missed(
         The surface in space, its faces in the order of the diagram.
     points, faces
         The dual in space (V, 3), (F, 3).
-    creased
-        The cells (n,) whose vertex may move.
+    sharp
+        Which edges of the surface (E,) are creases.
 
     Notes
     -----
     Where a cell holds little more than the tip of a corner the planes there weigh next to nothing, and the corner
-    is cut off by a tenth of an edge or more. A vertex goes to the point of the input in its cell that the mesh is
-    farthest from, and back if that leaves the mesh farther from the cell than before.
+    is cut off by a tenth of an edge or more. The vertex of a cell goes to the corner in it that the mesh is farthest
+    from, and back if that takes the mesh farther from the surface in the cells around.
     """
     before, after = diagram.label[diagram.previous], diagram.label
     at_corner = np.flatnonzero((before < 0) & (after < 0))
@@ -99,24 +118,15 @@ def snap_to_missed(
     mesh = Surface(points, faces)
     missed = (_MISSED * float(mesh.edge_lengths.mean())) ** 2
     squared = ClosestPoints(mesh).squared_distances(surface.points)
-    worst, value = _worst_of(owner, squared, len(points))
-    may = np.zeros(len(points), dtype=bool)
-    may[creased] = True
-    moving = np.flatnonzero(may & (value > missed))
+    candidate = np.flatnonzero(corners(surface, sharp) & (owner >= 0) & (squared > missed))
+    candidate = candidate[np.argsort(squared[candidate], kind="stable")]
     moved = np.array(points)
-    moved[moving] = surface.points[worst[moving]]
-    left = _worst_of(owner, ClosestPoints(Surface(moved, faces)).squared_distances(surface.points), len(points))[1]
-    back = moving[left[moving] >= value[moving]]
-    moved[back] = points[back]
+    moved[owner[candidate]] = surface.points[candidate]  # of several in a cell the last, the farthest, stays
+    after_squared = ClosestPoints(Surface(moved, faces)).squared_distances(surface.points)
+    change = np.bincount(owner[owner >= 0], (after_squared - squared)[owner >= 0], minlength=len(points))
+    around = np.zeros(len(points))
+    for corner in range(3):
+        np.add.at(around, faces[:, corner], change[faces].sum(axis=1))
+    worse = around > 0.0
+    moved[worse] = points[worse]
     return moved
-
-
-def _worst_of(
-    owner: npt.NDArray[np.int64], squared: npt.NDArray[np.float64], n: int
-) -> tuple[npt.NDArray[np.int64], npt.NDArray[np.float64]]:
-    """Return, for each of n cells, the point it owns with the largest value, and that value (-1, 0 for none)."""
-    order = np.argsort(squared, kind="stable")
-    order = order[owner[order] >= 0]
-    point, value = np.full(n, -1), np.zeros(n)
-    point[owner[order]], value[owner[order]] = order, squared[order]
-    return point, value

@@ -12,7 +12,7 @@ from anisomesh.cvt.diagram import Diagram
 from anisomesh.cvt.voronoi import RestrictedVoronoi
 from anisomesh.dual.cells import Cells, cells_of
 from anisomesh.dual.decimate import decimate
-from anisomesh.dual.place import crease_positions, snap_to_missed
+from anisomesh.dual.place import crease_positions, creased_cells, sharp_edges, snap_to_missed
 from anisomesh.dual.simplicial import simplicial_mesh
 from anisomesh.dual.triangulate import dual_mesh
 from anisomesh.dual.untangle import untangle
@@ -77,7 +77,8 @@ def refine(
     n_vertices
         Vertices asked for.
     crease_angle
-        Cells whose normals spread by more than this many degrees get their vertex where their planes meet.
+        Edges of the surface whose faces differ by more than this many degrees are creases, onto which the vertices of
+        their cells are put.
 
     Notes
     -----
@@ -106,9 +107,10 @@ def refine(
         points, faces = voronoi.points, surface.faces
     else:
         points, faces, _ = simplicial_mesh(dual_mesh(diagram, cells, surface.face_edges))
-        creased, places = crease_positions(voronoi, diagram, cells, scale, crease_angle)
-        points[creased, :3] = scale * places
-        points[:, :3] = scale * snap_to_missed(diagram, cells, surface, points[:, :3] / scale, faces, creased)
+        sharp = sharp_edges(surface, crease_angle)
+        creased = creased_cells(diagram, cells, surface, sharp)
+        points[creased, :3] = scale * crease_positions(voronoi, diagram, cells, scale, creased)
+        points[:, :3] = scale * snap_to_missed(diagram, cells, surface, points[:, :3] / scale, faces, sharp)
     inserted = max(len(points) - n_start, 0) if not from_input else 0
     reference = ClosestPoints(surface)
     space, faces, turned = untangle(points[:, :3] / scale, faces, reference)

@@ -11,6 +11,7 @@ from anisomesh.surface.closest import ClosestPoints
 from anisomesh.surface.mesh import Surface
 
 MAX_ROUNDS = 60
+_SWEEPS = 10
 _LIFTS = (0.0, 0.1, 0.25, 0.5, 1.0)  # trial heights over an edge, in edge lengths
 
 Ints = npt.NDArray[np.int64]
@@ -36,7 +37,8 @@ def untangle(points: Points, faces: Faces, reference: ClosestPoints) -> tuple[Po
     In each round every turned triangle is given the flip of one of its edges, or else the move of one of its
     points to the average of its neighbours (on the surface or not), or else the collapse of one of its edges, or
     else a point on one of its edges, lifted to the side of the surface that the mesh is on there (on a thin sheet a
-    chord can come nearer to the other side). Taken is what leaves fewest turned triangles among those it changes,
+    chord can come nearer to the other side), or else a few sweeps of smoothing around it. Taken is what leaves fewest
+    turned triangles among those it changes,
     and only if their number falls, so the rounds end.
     """
     for _ in range(MAX_ROUNDS):
@@ -53,9 +55,13 @@ def untangle(points: Points, faces: Faces, reference: ClosestPoints) -> tuple[Po
             points = moved
             continue
         changed = _collapse(surface, turned, reference) or _split(surface, turned, reference)
-        if changed is None:
+        if changed is not None:
+            points, faces = changed
+            continue
+        relaxed = _relax(surface, turned, reference)
+        if relaxed is None:
             break
-        points, faces = changed
+        points = relaxed
     return points, faces, int(reference.turned(points[faces]).sum())
 
 
@@ -158,6 +164,26 @@ def _split(surface: Surface, turned: npt.NDArray[np.bool_], reference: ClosestPo
                     faces = np.concatenate([np.delete(surface.faces, [face, other], axis=0), new]).astype(np.int32)
                     best = gain, points, faces
     return best[1:] if best is not None else None
+
+
+def _relax(surface: Surface, turned: npt.NDArray[np.bool_], reference: ClosestPoints) -> Points | None:
+    """Return the points after sweeps of smoothing around the turned triangles, None if none of them helps."""
+    near = np.zeros(surface.n_points, dtype=bool)
+    near[surface.faces[turned]] = True
+    near[surface.faces[near[surface.faces].any(axis=1)]] = True
+    rows, columns = np.concatenate([surface.edges, surface.edges[:, ::-1]]).T
+    rows, columns = rows[near[rows]], columns[near[rows]]
+    count = np.bincount(rows, minlength=surface.n_points)[near]
+    around = near[surface.faces].any(axis=1)
+    points = surface.points.copy()
+    for _ in range(_SWEEPS):
+        sums = [np.bincount(rows, points[columns, axis], minlength=surface.n_points)[near] for axis in range(3)]
+        facet, weights = reference.locate(np.stack(sums, axis=1) / count[:, None])
+        corners = reference.surface.points[reference.surface.faces[facet]]
+        points[near] = np.einsum("nc,ncx->nx", weights, corners)
+        if reference.turned(points[surface.faces[around]]).sum() < turned.sum():
+            return points
+    return None
 
 
 def _shape(corners: npt.NDArray[np.float64]) -> npt.NDArray[np.float64]:

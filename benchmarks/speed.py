@@ -1,0 +1,142 @@
+"""Times and memory: one evaluation, whole runs, growth with size, start-up.
+
+Usage: python benchmarks/speed.py [--sizes 5000 20000 60000 200000]
+Run it on a machine with nothing else to do. Meshes are made by code.
+"""
+
+from __future__ import annotations
+
+import argparse
+import os
+import subprocess
+import sys
+import tempfile
+import time
+from pathlib import Path
+
+import numpy as np
+from scipy.spatial import cKDTree
+
+import anisomesh
+from anisomesh.cvt.optimise import lloyd, minimise
+from anisomesh.cvt.sampling import resample_by_energy, sample_surface
+from anisomesh.cvt.voronoi import RestrictedVoronoi
+from anisomesh.embedding.direct import embed
+from anisomesh.metric.tensor import compute_metric
+from anisomesh.surface.geometry import unit_frame
+from anisomesh.surface.mesh import Surface
+from anisomesh.surface.shapes import twisted_ring
+
+
+def ring(n_points: int) -> Surface:
+    """Return a closed surface with creases and anisotropy of about this many points."""
+    finer = np.sqrt(n_points / 5440)
+    surface = twisted_ring(n_major=round(160 * finer), n_section=(round(12 * finer), round(5 * finer)))
+    return surface.with_points(unit_frame(surface.points).to_unit(surface.points))
+
+
+class TimedVoronoi(RestrictedVoronoi):
+    """The diagram, with a clock."""
+
+    seconds: list[float]
+
+    def evaluate(self, sites, sharpness=1.0):
+        start = time.perf_counter()
+        result = super().evaluate(sites, sharpness)
+        self.seconds.append(time.perf_counter() - start)
+        return result
+
+
+def evaluation(n: int, iterations: int = 100) -> tuple[float, float, int]:
+    """Return mean seconds of an evaluation, median seconds of a query of 20 neighbours, facets."""
+    surface = ring(n)
+    embedding = embed(surface, compute_metric(surface).tensors)
+    voronoi = TimedVoronoi(embedding.points, surface.faces, threads=2)
+    voronoi.seconds = []
+    rng = np.random.default_rng(0)
+    sites = lloyd(voronoi, sample_surface(voronoi.points, voronoi.faces, voronoi.facets.area, n, rng), 6)
+    sites = lloyd(voronoi, resample_by_energy(voronoi, sites, 28.0, rng), 3)
+    voronoi.seconds = []
+    sites = minimise(voronoi, sites, sharpness=7.0, max_iterations=iterations, tolerance=0.0).sites
+    queries = []
+    for _ in range(9):
+        tree = cKDTree(sites)
+        start = time.perf_counter()
+        tree.query(sites, 20, workers=1)
+        queries.append(time.perf_counter() - start)
+    return float(np.mean(voronoi.seconds)), float(np.median(queries)), surface.n_faces
+
+
+def whole_run(n: int, ratio: float) -> dict[str, float]:
+    return anisomesh.remesh(ring(n), ratio=ratio).seconds
+
+
+def fresh(code: str, **environment: str) -> str:
+    done = subprocess.run(
+        [sys.executable, "-c", code], capture_output=True, text=True, check=True, env={**os.environ, **environment}
+    )
+    return done.stdout.strip()
+
+
+MEMORY = """
+import resource, sys
+sys.path.insert(0, {folder!r})
+from speed import ring
+from anisomesh import remesh
+import numpy as np
+surface = ring({n})
+remesh(ring(2000), ratio=0.5)
+peak = lambda: resource.getrusage(resource.RUSAGE_SELF).ru_maxrss * 1024
+before = peak()
+from anisomesh.cvt.voronoi import RestrictedVoronoi
+from anisomesh.cvt.optimise import lloyd, minimise
+from anisomesh.cvt.sampling import sample_surface
+from anisomesh.surface.geometry import unit
+points = np.concatenate([surface.points, 0.1 * surface.point_normals, np.zeros((surface.n_points, 2))], axis=1)
+voronoi = RestrictedVoronoi(points, surface.faces)
+sites = sample_surface(voronoi.points, voronoi.faces, voronoi.facets.area, {n}, np.random.default_rng(0))
+before = peak()
+sites = minimise(voronoi, lloyd(voronoi, sites, 4), sharpness=7.0, max_iterations=12).sites
+middle = peak()
+voronoi.diagram(sites)
+print((middle - before) / {n}, (peak() - before) / {n})
+"""
+
+
+def main() -> None:
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("--sizes", type=int, nargs="+", default=[5_000, 20_000, 60_000, 200_000])
+    options = parser.parse_args()
+    anisomesh.remesh(ring(2000), ratio=0.5)  # compile
+    mean, query, facets = evaluation(6_000)
+    print(f"load {os.getloadavg()[0]:.2f}, {os.cpu_count()} cores")
+    print(
+        f"evaluation, 6,000 sites, {facets:,} facets, 8-D, mean of 100 iterations: {mean * 1e3:.1f} ms; "
+        f"k-d tree query of 20 neighbours: {query * 1e3:.1f} ms; ratio {mean / query:.2f}"
+    )
+    for ratio in (1.0, 0.2, 0.1):
+        runs = sorted((whole_run(6_000, ratio) for _ in range(3)), key=lambda seconds: seconds["total"])
+        stages = ", ".join(f"{name} {value:.2f}" for name, value in runs[1].items())
+        print(f"remesh, 6,000 vertices at {ratio:.0%}: {stages} s")
+    times = []
+    for n in options.sizes:
+        mean, query, _ = evaluation(n, iterations=12)
+        times.append(mean)
+        print(f"evaluation, {n:,} sites: {mean * 1e3:.1f} ms, query {query * 1e3:.1f} ms", flush=True)
+    exponent = np.polyfit(np.log(options.sizes), np.log(times), 1)[0]
+    print(f"evaluation time grows as n^{exponent:.2f}")
+    folder = str(Path(__file__).parent.resolve())
+    print("bytes a site, optimisation and with diagram:", fresh(MEMORY.format(n=options.sizes[-1], folder=folder)))
+    code = "import time; t = time.perf_counter(); import anisomesh; print(time.perf_counter() - t)"
+    print("import anisomesh:", fresh(code), "s")
+    with tempfile.TemporaryDirectory() as cache:
+        code = (
+            "import time; from anisomesh import remesh, sample; from anisomesh.surface.shapes import sphere\n"
+            "s = sphere(3); t = time.perf_counter(); remesh(s, ratio=0.5); a = time.perf_counter() - t\n"
+            "t = time.perf_counter(); remesh(s, ratio=0.5); print(a - (time.perf_counter() - t))"
+        )
+        print("first compile:", fresh(code, NUMBA_CACHE_DIR=cache), "s")
+
+
+if __name__ == "__main__":
+    main()

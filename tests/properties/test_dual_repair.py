@@ -1,0 +1,174 @@
+"""Collapses, flips, moves and placement keep the topology and do what they are for."""
+
+import numpy as np
+import pytest
+
+from anisomesh.cvt.voronoi import RestrictedVoronoi
+from anisomesh.dual.cells import cells_of
+from anisomesh.dual.decimate import collapsible_edges, decimate
+from anisomesh.dual.exchange import exchange_sites
+from anisomesh.dual.place import crease_positions, snap_to_missed
+from anisomesh.dual.simplicial import simplicial_mesh
+from anisomesh.dual.triangulate import dual_mesh
+from anisomesh.dual.untangle import untangle
+from anisomesh.evaluation.validity import check_validity, flipped_faces
+from anisomesh.surface.closest import ClosestPoints
+from anisomesh.surface.mesh import Surface
+from anisomesh.surface.shapes import box, cad_part, open_patch, sphere, torus
+
+SHAPES = {"sphere": sphere(3), "torus": torus(1.0, 0.3, 48, 16), "part": cad_part(8)}
+
+
+def assert_same_topology(result, reference):
+    validity = check_validity(result, reference)
+    assert validity.euler == validity.euler_input
+    assert validity.components == check_validity(reference, reference).components
+    assert validity.oriented
+    assert validity.nonmanifold_edges == validity.nonmanifold_vertices == 0
+
+
+@pytest.mark.parametrize("name", SHAPES)
+@pytest.mark.parametrize("share", [0.9, 0.5, 0.15])
+def test_decimation_reaches_the_number_and_keeps_topology_and_side(name, share):
+    surface = SHAPES[name]
+    n = int(share * surface.n_points)
+    points, faces = decimate(surface.points, surface.faces, n, ClosestPoints(surface))
+    result = Surface(points, faces)
+    assert result.n_points == n
+    assert_same_topology(result, surface)
+    assert not flipped_faces(result, surface).any()
+    known = {tuple(point) for point in surface.points.tolist()}
+    assert all(tuple(point) in known for point in points.tolist())
+
+
+def test_decimation_of_a_box_keeps_its_corners_until_the_end():
+    surface = box(n=6)
+    points, faces = decimate(surface.points, surface.faces, 8, ClosestPoints(surface))
+    assert len(points) == 8
+    np.testing.assert_allclose(np.sort(np.abs(points - 0.5).ravel()), 0.5)
+    assert Surface(points, faces).area == pytest.approx(surface.area)
+
+
+def test_decimation_stops_where_nothing_can_go():
+    tetrahedron = Surface(np.vstack([np.zeros(3), np.eye(3)]), np.array([[0, 2, 1], [0, 1, 3], [0, 3, 2], [1, 2, 3]]))
+    points, faces = decimate(tetrahedron.points, tetrahedron.faces, 1, ClosestPoints(tetrahedron))
+    assert len(points) == 4
+    assert len(faces) == 4
+
+
+def test_decimation_keeps_the_boundary_loop():
+    surface = open_patch(lambda x, y: 0.3 * x * y, n=16)
+    n = surface.n_points // 3
+    points, faces = decimate(surface.points, surface.faces, n, ClosestPoints(surface))
+    result = Surface(points, faces)
+    validity = check_validity(result, surface)
+    assert validity.boundary_loops == 1
+    assert validity.euler == validity.euler_input == 1
+
+
+def test_link_condition_against_sets():
+    surface = SHAPES["torus"]
+    small, faces = decimate(surface.points, surface.faces, 40, ClosestPoints(surface))
+    mesh = Surface(small, faces)
+
+    def link(vertices):
+        star = [face for face in mesh.faces.tolist() if set(vertices) <= set(face)]
+        found = set()
+        for face in star:
+            rest = frozenset(face) - frozenset(vertices)
+            found |= {rest} | {frozenset([v]) for v in rest}
+        return found
+
+    expected = [link([u]) & link([v]) == link([u, v]) for u, v in mesh.edges.tolist()]
+    assert collapsible_edges(mesh).tolist() == expected
+
+
+@pytest.mark.parametrize("name", SHAPES)
+@pytest.mark.parametrize("seed", range(3))
+def test_folded_triangles_are_turned_back(name, seed):
+    surface = SHAPES[name]
+    rng = np.random.default_rng(seed)
+    points = np.array(surface.points)
+    edges = surface.edges[rng.choice(len(surface.edges), 6, replace=False)]
+    for u, v in edges.tolist():
+        points[u] += 1.6 * (points[v] - points[u])  # over the neighbour and beyond
+    folded = Surface(points, surface.faces)
+    assert flipped_faces(folded, surface).any()
+    mended_points, faces, left = untangle(folded.points, folded.faces, ClosestPoints(surface))
+    mended = Surface(mended_points, faces)
+    assert left == 0
+    assert not flipped_faces(mended, surface).any()
+    assert_same_topology(mended, surface)
+
+
+def test_a_good_mesh_is_left_alone():
+    surface = SHAPES["part"]
+    points, faces, left = untangle(surface.points, surface.faces, ClosestPoints(surface))
+    assert left == 0
+    assert points is surface.points
+    assert faces is surface.faces
+
+
+def _box_dual(n_sites, seed=0):
+    surface = box(n=12)
+    voronoi = RestrictedVoronoi(surface.points, surface.faces, threads=1)
+    ordered = Surface(surface.points, voronoi.faces)
+    rng = np.random.default_rng(seed)
+    sites = surface.points[rng.choice(surface.n_points, n_sites, replace=False)] * 0.98 + 0.01
+    diagram = voronoi.diagram(sites)
+    return ordered, voronoi, diagram, cells_of(diagram, ordered.face_neighbours, voronoi.facets.area)
+
+
+def test_vertices_of_corner_cells_go_to_the_corner():
+    _, voronoi, diagram, cells = _box_dual(120)
+    chosen, places = crease_positions(voronoi, diagram, cells, 1.0, 40.0)
+    normals = np.abs(voronoi.facets.normal[diagram.facet]).round().astype(bool)
+    axes = np.zeros((len(cells.site), 3), dtype=bool)
+    np.logical_or.at(axes, cells.of_polygon, normals)
+    flat = np.setdiff1d(np.arange(len(cells.site)), chosen)
+    assert (axes[chosen].sum(axis=1) > 1).all()
+    assert (axes[flat].sum(axis=1) == 1).any()
+    shares = diagram.fractions * voronoi.facets.area[diagram.facet]
+    for component, place in zip(chosen, places, strict=True):
+        mine = cells.of_polygon == component
+        for axis in np.flatnonzero(axes[component]):
+            share = shares[mine & normals[:, axis]].sum() / shares[mine].sum()
+            side = np.round(diagram.points[diagram.faces[diagram.facet[mine & normals[:, axis]]]][..., axis].mean())
+            # one plane pulls with s^2 - 1 times its share of the cell, the centroid with 1
+            assert abs(place[axis] - side) < 1.0 / (1.0 + (100.0**2 - 1.0) * share) + 1e-9
+
+
+def test_an_angle_of_180_degrees_chooses_no_cell():
+    _, voronoi, diagram, cells = _box_dual(30)
+    chosen, places = crease_positions(voronoi, diagram, cells, 1.0, 180.0)
+    assert len(chosen) == len(places) == 0
+
+
+def test_missed_corners_are_met_after_snapping():
+    surface, voronoi, diagram, cells = _box_dual(200, seed=3)
+    points, faces, done = simplicial_mesh(dual_mesh(diagram, cells, surface.face_edges))
+    assert done
+    creased, _ = crease_positions(voronoi, diagram, cells, 1.0, 40.0)
+    corners = np.array(np.meshgrid([0, 1], [0, 1], [0, 1])).reshape(3, -1).T.astype(float)
+    before = np.sqrt(ClosestPoints(Surface(points, faces)).squared_distances(corners))
+    snapped = snap_to_missed(diagram, cells, surface, points, faces, creased)
+    after = np.sqrt(ClosestPoints(Surface(snapped, faces)).squared_distances(corners))
+    assert before.max() > 0.01
+    assert after.max() < before.max()
+    assert (after < 1e-9).sum() > (before < 1e-9).sum()
+    unmoved = np.setdiff1d(np.arange(len(points)), creased)
+    np.testing.assert_array_equal(snapped[unmoved], points[unmoved])
+
+
+def test_exchange_puts_a_site_on_a_missed_corner():
+    surface = box(n=12)
+    voronoi = RestrictedVoronoi(surface.points, surface.faces, threads=1)
+    ordered = Surface(surface.points, voronoi.faces)
+    corner = np.ones(3)
+    sites = surface.points[np.linalg.norm(surface.points - corner, axis=1) > 0.25][::2]
+    changed = exchange_sites(voronoi, sites, ordered, 1.0, 7.0)
+    assert changed.shape == sites.shape
+    assert np.linalg.norm(sites - corner, axis=1).min() > 0.25
+    assert np.linalg.norm(changed - corner, axis=1).min() == 0.0
+    kept = (changed[:, None] == sites[None]).all(axis=2).any(axis=1)
+    assert kept.mean() >= 0.95
