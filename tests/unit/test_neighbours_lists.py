@@ -12,8 +12,8 @@ def assert_lists_hold(table, sites):
     """Every list is sorted, has true distances, no duplicates, and all sites within its complete radius."""
     distance2 = ((sites[:, None] - sites[None]) ** 2).sum(axis=2)
     for site in range(len(sites)):
-        listed = table.neighbours[table.start[site] : table.start[site + 1]]
-        promised = table.distance2[table.start[site] : table.start[site + 1]]
+        listed = table.neighbours[table.start[site] : table.start[site] + table.length[site]]
+        promised = table.distance2[table.start[site] : table.start[site] + table.length[site]]
         np.testing.assert_allclose(promised, distance2[site, listed], rtol=1e-12, atol=1e-300)
         assert np.all(np.diff(promised) >= 0)
         assert len(set(listed.tolist())) == len(listed)
@@ -59,7 +59,7 @@ def test_tied_neighbours_are_sorted_by_index():
     sites = np.stack(np.meshgrid(*3 * [np.arange(4.0)]), axis=-1).reshape(-1, 3)
     table = NeighbourLists().table(sites, 1)
     for site in range(len(sites)):
-        part = slice(table.start[site], table.start[site + 1])
+        part = slice(table.start[site], table.start[site] + table.length[site])
         keys = list(zip(table.distance2[part].tolist(), table.neighbours[part].tolist(), strict=True))
         assert keys == sorted(keys)
 

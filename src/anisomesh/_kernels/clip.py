@@ -43,7 +43,8 @@ class Sites(NamedTuple):
     """Sites and their neighbour lists, sorted by distance."""
 
     positions: np.ndarray  # (S, d)
-    start: np.ndarray  # (S + 1,) first neighbour of each site
+    start: np.ndarray  # (S,) first neighbour of each site
+    length: np.ndarray  # (S,) number of its neighbours
     neighbours: np.ndarray  # (N,) int32
     distance2: np.ndarray  # (N,) squared distances
     complete: np.ndarray  # (S,) radius within which the list of a site holds every other site
@@ -216,7 +217,7 @@ def clip_facet(facet, owner, facets, sites, ws):
     ``owner`` is a site likely to own a part of the facet. Returns the number of polygons or a negative status;
     lists that are too short are noted in the workspace, all those on the facet at once.
     """
-    positions, start, neighbours, distance2, complete = sites
+    positions, start, count, neighbours, distance2, complete = sites
     (
         clock,
         stamp,
@@ -265,7 +266,7 @@ def clip_facet(facet, owner, facets, sites, ws):
         n = 3
         source = 0
         rival = -1
-        for k in range(start[site], start[site + 1]):
+        for k in range(start[site], start[site] + count[site]):
             if distance2[k] > 4.0 * radius2 * (1.0 + _SLOP):
                 break
             other = neighbours[k]

@@ -19,7 +19,7 @@ def displacements(positions, reference, moved):
 
 
 @njit(cache=True, nogil=True)
-def refresh_lists(which, positions, start, neighbours, distance2):
+def refresh_lists(which, positions, start, count, neighbours, distance2):
     """Recompute the squared distances of the lists of these sites and sort each list by them.
 
     Insertion sort: the lists are almost sorted from the last time. Ties keep the order of the site index, so
@@ -28,7 +28,7 @@ def refresh_lists(which, positions, start, neighbours, distance2):
     dimension = positions.shape[1]
     for site in which:
         first = start[site]
-        for k in range(first, start[site + 1]):
+        for k in range(first, first + count[site]):
             other = neighbours[k]
             d2 = 0.0
             for c in range(dimension):
@@ -44,7 +44,7 @@ def refresh_lists(which, positions, start, neighbours, distance2):
 
 
 @njit(cache=True, nogil=True)
-def limit_radius(start, neighbours, distance, index, radius):
+def limit_radius(start, count, neighbours, distance, index, radius):
     """Lower the radius of each site to the distance of the nearest probe that its list does not hold.
 
     ``distance`` and ``index`` (S, k) are probes in order of distance, index -1 for none. If a list holds all
@@ -58,7 +58,7 @@ def limit_radius(start, neighbours, distance, index, radius):
             if other == site:
                 continue
             held = False
-            for k in range(start[site], start[site + 1]):
+            for k in range(start[site], start[site] + count[site]):
                 if neighbours[k] == other:
                     held = True
                     break

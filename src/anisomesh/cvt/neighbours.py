@@ -17,6 +17,7 @@ _FAR = 0.2  # of the median list radius: when a site is this far from its anchor
 _NEAR = 0.08  # and these are the ones farther from their anchors than this
 _MOST = 0.3  # of all sites; if more are to be anchored anew, all lists are rebuilt
 _SPARE = 1.3  # a list that proves too short is made this much longer than needed
+_CROWDED = 3  # times the room that the lists in use take; then, too
 _PROBES = 4  # newly anchored sites that are looked for near every other site
 
 Floats = npt.NDArray[np.float64]
@@ -58,7 +59,8 @@ class NeighbourLists:
         self._farthest = displacements(sites, self._anchors, self._moved)
         if self._farthest > _FAR * self._typical:
             movers = np.flatnonzero(self._moved > _NEAR * self._typical)
-            if len(movers) > _MOST * self.n_sites:
+            crowded = len(self._neighbours) > _CROWDED * self._counts.sum()
+            if crowded or len(movers) > _MOST * self.n_sites:
                 self._rebuild(sites, threads)
             else:
                 self._anchor(sites, movers, threads)
@@ -73,24 +75,14 @@ class NeighbourLists:
         """
         short = np.flatnonzero(needed)
         wanted = _SPARE * needed[short] + self._moved[short] + self._farthest
-        old_counts = self._counts.copy()
-        found: list[tuple[Rows, npt.NDArray[np.int32]]] = []
+        counts = self._counts[short]  # often enough: a radius may have been limited since the last search
         while len(short):
-            for count in np.unique(self._counts[short]):
-                group = short[self._counts[short] == count]
-                found.append((group, self._search(group, int(count), threads)))
+            for count in np.unique(counts).tolist():
+                self._append(short[counts == count], count, threads)
             unmet = self._radius[short] < wanted
+            self._refresh(sites, short[~unmet], threads)
             short, wanted = short[unmet], wanted[unmet]
-            self._counts[short] = np.minimum(2 * self._counts[short], self.n_sites - 1)
-        self._start = np.concatenate([[0], np.cumsum(self._counts)])
-        kept = needed == 0.0
-        into, out_of = np.repeat(kept, self._counts), np.repeat(kept, old_counts)
-        neighbours, distance2 = np.empty(self._start[-1], dtype=np.int32), np.zeros(self._start[-1])
-        neighbours[into], distance2[into] = self._neighbours[out_of], self._distance2[out_of]
-        self._neighbours, self._distance2 = neighbours, distance2
-        for group, lists in found:
-            self._put(group, lists)
-        self._refresh(sites, np.flatnonzero(needed), threads)
+            counts = np.minimum(2 * counts[unmet], self.n_sites - 1)
         return self._as_table(sites)
 
     def nearest(self, queries: Floats, sites: Sites, threads: int) -> npt.NDArray[np.int32]:
@@ -101,19 +93,27 @@ class NeighbourLists:
 
     def _as_table(self, sites: Sites) -> clip.Sites:
         complete = self._radius - self._moved - self._farthest
-        return clip.Sites(sites, self._start, self._neighbours, self._distance2, complete)
+        return clip.Sites(sites, self._start, self._counts, self._neighbours, self._distance2, complete)
 
     def _rebuild(self, sites: Sites, threads: int) -> None:
-        count = min(_BASE_NEIGHBOURS, len(sites) - 1)
         self.n_sites = len(sites)
         self._anchors = np.array(sites)
         self._tree = cKDTree(self._anchors)
-        self._counts = np.full(self.n_sites, count)
         self._radius = np.empty(self.n_sites)
-        self._start = np.arange(self.n_sites + 1) * count
-        self._neighbours = np.ascontiguousarray(self._search(np.arange(self.n_sites), count, threads).ravel())
-        self._distance2 = np.zeros(len(self._neighbours))
+        self._start = np.zeros(self.n_sites, dtype=np.int64)
+        self._counts = np.zeros(self.n_sites, dtype=np.int64)
+        self._neighbours = np.zeros(0, dtype=np.int32)
+        self._distance2 = np.zeros(0)
+        self._append(np.arange(self.n_sites), min(_BASE_NEIGHBOURS, self.n_sites - 1), threads)
         self._typical = float(np.median(self._radius))
+
+    def _append(self, group: Rows, count: int, threads: int) -> None:
+        """Give these sites lists of a length, behind all others; their old ones are left unused until a rebuild."""
+        end = len(self._neighbours)
+        self._start[group] = end + count * np.arange(len(group))
+        self._counts[group] = count
+        self._neighbours = np.concatenate([self._neighbours, self._search(group, count, threads).ravel()])
+        self._distance2 = np.concatenate([self._distance2, np.zeros(count * len(group))])
 
     def _anchor(self, sites: Sites, movers: Rows, threads: int) -> None:
         """Anchor these sites where they are now."""
@@ -125,10 +125,11 @@ class NeighbourLists:
             self._anchors, range(1, probes + 1), distance_upper_bound=float(self._radius.max()), workers=threads
         )
         index = np.append(movers, -1)[np.minimum(index, len(movers))]
-        limit_radius(self._start, self._neighbours, distance, index, self._radius)
+        limit_radius(self._start, self._counts, self._neighbours, distance, index, self._radius)
         for count in np.unique(self._counts[movers]):
             group = movers[self._counts[movers] == count]
-            self._put(group, self._search(group, int(count), threads))
+            places = self._start[group][:, None] + np.arange(count)
+            self._neighbours[places] = self._search(group, int(count), threads)
 
     def _search(self, group: Rows, count: int, threads: int) -> npt.NDArray[np.int32]:
         """Return the ``count`` other sites with the nearest anchors (n, count) and set the radius they fill."""
@@ -142,14 +143,9 @@ class NeighbourLists:
         self._radius[group] = distance[:, -1] if count < self.n_sites - 1 else np.inf
         return np.asarray(index[others].reshape(len(group), count), dtype=np.int32)
 
-    def _put(self, group: Rows, lists: npt.NDArray[np.int32]) -> None:
-        """Store lists (n, k) for those of a group whose lists have that length."""
-        fits = self._counts[group] == lists.shape[1]
-        self._neighbours[self._start[group[fits]][:, None] + np.arange(lists.shape[1])] = lists[fits]
-
     def _refresh(self, sites: Sites, which: Rows, threads: int) -> None:
-        arrays = (sites, self._start, self._neighbours, self._distance2)
-        shares = np.array_split(which, min(threads, 1 + len(which) // 1000))
+        arrays = (sites, self._start, self._counts, self._neighbours, self._distance2)
+        shares = np.array_split(which, min(threads, 1 + len(which) // 10_000))
         if len(shares) == 1:
             refresh_lists(which, *arrays)
             return

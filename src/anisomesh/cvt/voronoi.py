@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
-from typing import Any, TypeVar
+from typing import TypeVar
 
 import numpy as np
 import numpy.typing as npt
@@ -17,7 +17,9 @@ from anisomesh.cvt.neighbours import NeighbourLists
 from anisomesh.errors import OptionError
 from anisomesh.surface import geometry
 
-_CHUNK = 1024  # facets; fixed, so that sums do not depend on the number of threads
+# facets in a chunk; it depends on their number alone, so that sums do not depend on the number of threads, and is
+# large, because a thread that comes back from a kernel may wait long for the interpreter
+_MIN_CHUNK, _MAX_CHUNK, _MIN_CHUNKS = 1024, 4096, 4
 _MAX_ROUNDS = 40
 
 _T = TypeVar("_T")
@@ -71,6 +73,7 @@ class RestrictedVoronoi:
         self.faces = np.ascontiguousarray(faces[self.order], dtype=np.int32)
         self.facets = facet_table(self.points, self.faces)
         self.threads = threads
+        self._chunk = int(np.clip(-(-len(faces) // _MIN_CHUNKS), _MIN_CHUNK, _MAX_CHUNK))
         self._lists = NeighbourLists()
         self._owners = np.zeros(0, dtype=np.int32)
         self._buffers: list[_Buffers] = []
@@ -135,7 +138,7 @@ class RestrictedVoronoi:
             self._owners = self._lists.nearest(self.points[self.faces[:, 0]], sites, self.threads)
             self._buffers = []
         while len(self._buffers) < self.threads:
-            self._buffers.append(_Buffers(len(sites), sites.shape[1], self._size))
+            self._buffers.append(_Buffers(len(sites), sites.shape[1], self._size, self._chunk))
         return sites
 
     def _run(self, work: Callable[[Chunk, _Buffers], tuple[_T, Problems]], sites: Sites) -> list[_T]:
@@ -143,7 +146,7 @@ class RestrictedVoronoi:
         facets = np.arange(len(self.faces), dtype=np.int32)
         parts: list[_T] = []
         for _ in range(_MAX_ROUNDS):
-            results = self._run_once(work, np.split(facets, np.arange(_CHUNK, len(facets), _CHUNK)))
+            results = self._run_once(work, np.split(facets, np.arange(self._chunk, len(facets), self._chunk)))
             parts.extend(part for part, _ in results)
             problems = np.concatenate([problems for _, problems in results])
             if len(problems) == 0:
@@ -158,16 +161,14 @@ class RestrictedVoronoi:
         threads = min(self.threads, len(chunks))
         if threads == 1:
             return [work(chunk, self._buffers[0]) for chunk in chunks]
-        todo = iter(range(len(chunks)))
-        results: list[Any] = [None] * len(chunks)
 
-        def strand(thread: int) -> None:
-            for index in todo:
-                results[index] = work(chunks[index], self._buffers[thread])
+        def strand(thread: int) -> list[tuple[_T, Problems]]:
+            return [work(chunk, self._buffers[thread]) for chunk in chunks[thread::threads]]
 
-        with ThreadPoolExecutor(threads) as pool:
-            list(pool.map(strand, range(threads)))
-        return results
+        with ThreadPoolExecutor(threads - 1) as pool:
+            others = [pool.submit(strand, thread) for thread in range(1, threads)]
+            strands = [strand(0), *(other.result() for other in others)]
+        return [strands[k % threads][k // threads] for k in range(len(chunks))]
 
     def _mend(self, problems: Problems, sites: Sites) -> None:
         """Give workspaces more room, facets the nearest owner, lists more neighbours."""
@@ -175,7 +176,7 @@ class RestrictedVoronoi:
         needed = np.max([buffers.workspace.needed for buffers in self._buffers], axis=0)
         if (status == clip.BUFFER_TOO_SMALL).any():
             self._size *= 2
-            self._buffers = [_Buffers(len(sites), sites.shape[1], self._size) for _ in range(self.threads)]
+            self._buffers = [_Buffers(len(sites), sites.shape[1], self._size, self._chunk) for _ in range(self.threads)]
         for buffers in self._buffers:
             buffers.workspace.needed[:] = 0.0
         astray = facet[(status == clip.NO_OWNER) | (status == clip.START_TOO_FAR)]
@@ -190,7 +191,7 @@ class RestrictedVoronoi:
 class _Buffers:
     """What one thread writes into."""
 
-    def __init__(self, n_sites: int, dimension: int, size: int) -> None:
+    def __init__(self, n_sites: int, dimension: int, size: int, chunk: int) -> None:
         candidates = min(n_sites, 8 * size)
         vertices = 64 * size
         self.workspace = clip.Workspace(
@@ -208,11 +209,11 @@ class _Buffers:
             work=np.zeros((2, size, 7)),
             needed=np.zeros(n_sites),
         )
-        rows = min(n_sites + candidates, _CHUNK * size)
+        rows = min(n_sites + candidates, chunk * size)
         self.row_of = np.full(n_sites, -1, dtype=np.int32)
         self.touched = np.zeros(rows, dtype=np.int32)
         self.accumulated = np.zeros((rows, dimension + 2))
-        self.problems = np.zeros((_CHUNK, 2), dtype=np.int32)
+        self.problems = np.zeros((chunk, 2), dtype=np.int32)
 
 
 def facet_table(points: EmbeddedPoints, faces: Faces) -> clip.Facets:
