@@ -7,7 +7,7 @@ from anisomesh.cvt.voronoi import RestrictedVoronoi
 from anisomesh.dual.cells import cells_of
 from anisomesh.dual.decimate import collapsible_edges, decimate
 from anisomesh.dual.exchange import exchange_sites
-from anisomesh.dual.place import crease_positions, snap_to_missed
+from anisomesh.dual.place import corners, crease_positions, creased_cells, sharp_edges, snap_to_missed
 from anisomesh.dual.simplicial import simplicial_mesh
 from anisomesh.dual.triangulate import dual_mesh
 from anisomesh.dual.untangle import untangle
@@ -119,15 +119,15 @@ def _box_dual(n_sites, seed=0):
     return ordered, voronoi, diagram, cells_of(diagram, ordered.face_neighbours, voronoi.facets.area)
 
 
-def test_vertices_of_corner_cells_go_to_the_corner():
-    _, voronoi, diagram, cells = _box_dual(120)
-    chosen, places = crease_positions(voronoi, diagram, cells, 1.0, 40.0)
+def test_vertices_of_creased_cells_go_to_where_their_planes_meet():
+    surface, voronoi, diagram, cells = _box_dual(120)
+    chosen = creased_cells(diagram, cells, surface, sharp_edges(surface, 45.0))
+    places = crease_positions(voronoi, diagram, cells, 1.0, chosen)
     normals = np.abs(voronoi.facets.normal[diagram.facet]).round().astype(bool)
     axes = np.zeros((len(cells.site), 3), dtype=bool)
     np.logical_or.at(axes, cells.of_polygon, normals)
-    flat = np.setdiff1d(np.arange(len(cells.site)), chosen)
-    assert (axes[chosen].sum(axis=1) > 1).all()
-    assert (axes[flat].sum(axis=1) == 1).any()
+    assert chosen.tolist() == np.flatnonzero(axes.sum(axis=1) > 1).tolist()
+    assert len(chosen) < len(cells.site)
     shares = diagram.fractions * voronoi.facets.area[diagram.facet]
     for component, place in zip(chosen, places, strict=True):
         mine = cells.of_polygon == component
@@ -138,26 +138,36 @@ def test_vertices_of_corner_cells_go_to_the_corner():
             assert abs(place[axis] - side) < 1.0 / (1.0 + (100.0**2 - 1.0) * share) + 1e-9
 
 
-def test_an_angle_of_180_degrees_chooses_no_cell():
-    _, voronoi, diagram, cells = _box_dual(30)
-    chosen, places = crease_positions(voronoi, diagram, cells, 1.0, 180.0)
-    assert len(chosen) == len(places) == 0
+@pytest.mark.parametrize("angle", [91.0, 180.0])
+def test_no_edge_of_a_box_is_sharper_than_a_right_angle(angle):
+    surface, _, diagram, cells = _box_dual(30)
+    sharp = sharp_edges(surface, angle)
+    assert not sharp.any()
+    assert len(creased_cells(diagram, cells, surface, sharp)) == 0
+
+
+def test_corners_of_a_box_are_its_corners():
+    surface = box(n=5)
+    found = surface.points[corners(surface, sharp_edges(surface, 45.0))]
+    assert len(found) == 8
+    np.testing.assert_array_equal(np.abs(found - 0.5), 0.5)
 
 
 def test_missed_corners_are_met_after_snapping():
-    surface, voronoi, diagram, cells = _box_dual(200, seed=3)
+    surface, _, diagram, cells = _box_dual(200, seed=3)
     points, faces, done = simplicial_mesh(dual_mesh(diagram, cells, surface.face_edges))
     assert done
-    creased, _ = crease_positions(voronoi, diagram, cells, 1.0, 40.0)
-    corners = np.array(np.meshgrid([0, 1], [0, 1], [0, 1])).reshape(3, -1).T.astype(float)
-    before = np.sqrt(ClosestPoints(Surface(points, faces)).squared_distances(corners))
-    snapped = snap_to_missed(diagram, cells, surface, points, faces, creased)
-    after = np.sqrt(ClosestPoints(Surface(snapped, faces)).squared_distances(corners))
+    sharp = sharp_edges(surface, 45.0)
+    ends = surface.points[corners(surface, sharp)]
+    before = np.sqrt(ClosestPoints(Surface(points, faces)).squared_distances(ends))
+    snapped = snap_to_missed(diagram, cells, surface, points, faces, sharp)
+    after = np.sqrt(ClosestPoints(Surface(snapped, faces)).squared_distances(ends))
     assert before.max() > 0.01
-    assert after.max() < before.max()
     assert (after < 1e-9).sum() > (before < 1e-9).sum()
-    unmoved = np.setdiff1d(np.arange(len(points)), creased)
+    unmoved = np.setdiff1d(np.arange(len(points)), creased_cells(diagram, cells, surface, sharp))
     np.testing.assert_array_equal(snapped[unmoved], points[unmoved])
+    total = [ClosestPoints(Surface(p, faces)).squared_distances(surface.points).sum() for p in (points, snapped)]
+    assert total[1] < total[0]
 
 
 def test_exchange_puts_a_site_on_a_missed_corner():

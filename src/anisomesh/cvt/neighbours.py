@@ -12,12 +12,13 @@ from anisomesh._arrays import Sites
 from anisomesh._kernels import clip
 from anisomesh._kernels.neighbours import displacements, limit_radius, refresh_lists
 
-_BASE_NEIGHBOURS = 24
-_FAR = 0.2  # of the median list radius: when a site is this far from its anchor, sites are anchored anew
-_NEAR = 0.08  # and these are the ones farther from their anchors than this
+_BASE_NEIGHBOURS = 32
+_FAR = 0.3  # of the median list radius: when a site is this far from its anchor, sites are anchored anew
+_NEAR = 0.1  # and these are the ones farther from their anchors than this
 _MOST = 0.3  # of all sites; if more are to be anchored anew, all lists are rebuilt
 _SPARE = 1.3  # a list that proves too short is made this much longer than needed
 _CROWDED = 3  # times the room that the lists in use take; then, too
+_LONGEST_KEPT = 96  # a rebuild shortens longer lists to this
 _PROBES = 4  # newly anchored sites that are looked for near every other site
 
 Floats = npt.NDArray[np.float64]
@@ -47,6 +48,7 @@ class NeighbourLists:
         self._start: npt.NDArray[np.int64]
         self._neighbours: npt.NDArray[np.int32]
         self._typical = 0.0
+        self._used = 0  # entries of the lists that are taken
         self._tree: cKDTree | None = None  # of the anchors
         self._current: cKDTree | None = None  # of the positions in the last call of table
 
@@ -59,7 +61,7 @@ class NeighbourLists:
         self._farthest = displacements(sites, self._anchors, self._moved)
         if self._farthest > _FAR * self._typical:
             movers = np.flatnonzero(self._moved > _NEAR * self._typical)
-            crowded = len(self._neighbours) > _CROWDED * self._counts.sum()
+            crowded = self._used > _CROWDED * self._counts.sum()
             if crowded or len(movers) > _MOST * self.n_sites:
                 self._rebuild(sites, threads)
             else:
@@ -96,24 +98,33 @@ class NeighbourLists:
         return clip.Sites(sites, self._start, self._counts, self._neighbours, self._distance2, complete)
 
     def _rebuild(self, sites: Sites, threads: int) -> None:
-        self.n_sites = len(sites)
+        base = min(_BASE_NEIGHBOURS, len(sites) - 1)
+        if len(sites) != self.n_sites:
+            self.n_sites = len(sites)
+            self._counts = np.full(self.n_sites, base)
         self._anchors = np.array(sites)
         self._tree = cKDTree(self._anchors)
         self._radius = np.empty(self.n_sites)
         self._start = np.zeros(self.n_sites, dtype=np.int64)
-        self._counts = np.zeros(self.n_sites, dtype=np.int64)
-        self._neighbours = np.zeros(0, dtype=np.int32)
-        self._distance2 = np.zeros(0)
-        self._append(np.arange(self.n_sites), min(_BASE_NEIGHBOURS, self.n_sites - 1), threads)
+        counts = np.clip(self._counts, base, _LONGEST_KEPT)
+        self._used = 0
+        self._neighbours = np.zeros(2 * counts.sum(), dtype=np.int32)
+        self._distance2 = np.zeros(2 * counts.sum())
+        for count in np.unique(counts).tolist():
+            self._append(np.flatnonzero(counts == count), count, threads)
         self._typical = float(np.median(self._radius))
 
     def _append(self, group: Rows, count: int, threads: int) -> None:
         """Give these sites lists of a length, behind all others; their old ones are left unused until a rebuild."""
-        end = len(self._neighbours)
-        self._start[group] = end + count * np.arange(len(group))
+        first, self._used = self._used, self._used + count * len(group)
+        if self._used > len(self._neighbours):
+            room = np.zeros(self._used, dtype=np.int32)
+            self._neighbours = np.concatenate([self._neighbours, room])
+            self._distance2 = np.concatenate([self._distance2, room.astype(np.float64)])
+        self._start[group] = first + count * np.arange(len(group))
         self._counts[group] = count
-        self._neighbours = np.concatenate([self._neighbours, self._search(group, count, threads).ravel()])
-        self._distance2 = np.concatenate([self._distance2, np.zeros(count * len(group))])
+        self._neighbours[first : self._used] = self._search(group, count, threads).ravel()
+        self._distance2[first : self._used] = 0.0
 
     def _anchor(self, sites: Sites, movers: Rows, threads: int) -> None:
         """Anchor these sites where they are now."""
