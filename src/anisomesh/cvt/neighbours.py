@@ -19,6 +19,7 @@ _MOST = 0.3  # of all sites; if more are to be anchored anew, all lists are rebu
 _SPARE = 1.3  # a list that proves too short is made this much longer than needed
 _CROWDED = 3  # times the room that the lists in use take; then, too
 _LONGEST_KEPT = 96  # a rebuild shortens longer lists to this
+_ENOUGH_FOR_THREADS = 2_000  # sites; fewer are done before another thread has begun
 _PROBES = 4  # newly anchored sites that are looked for near every other site
 
 Floats = npt.NDArray[np.float64]
@@ -43,6 +44,7 @@ class NeighbourLists:
         self._anchors: Floats
         self._moved: Floats
         self._radius: Floats
+        self._filled: Floats  # the radius when the list was last sought
         self._distance2: Floats
         self._counts: npt.NDArray[np.int64]
         self._start: npt.NDArray[np.int64]
@@ -77,7 +79,8 @@ class NeighbourLists:
         """
         short = np.flatnonzero(needed)
         wanted = _SPARE * needed[short] + self._moved[short] + self._farthest
-        counts = self._counts[short]  # often enough: a radius may have been limited since the last search
+        limited = self._radius[short] < self._filled[short]  # a search as long as the last may do
+        counts = np.minimum(np.where(limited, 1, 2) * self._counts[short], self.n_sites - 1)
         while len(short):
             for count in np.unique(counts).tolist():
                 self._append(short[counts == count], count, threads)
@@ -104,7 +107,7 @@ class NeighbourLists:
             self._counts = np.full(self.n_sites, base)
         self._anchors = np.array(sites)
         self._tree = cKDTree(self._anchors)
-        self._radius = np.empty(self.n_sites)
+        self._radius, self._filled = np.empty(self.n_sites), np.empty(self.n_sites)
         self._start = np.zeros(self.n_sites, dtype=np.int64)
         counts = np.clip(self._counts, base, _LONGEST_KEPT)
         self._used = 0
@@ -145,20 +148,25 @@ class NeighbourLists:
     def _search(self, group: Rows, count: int, threads: int) -> npt.NDArray[np.int32]:
         """Return the ``count`` other sites with the nearest anchors (n, count) and set the radius they fill."""
         if count == 0:
-            self._radius[group] = np.inf
+            self._radius[group] = self._filled[group] = np.inf
             return np.zeros((len(group), 0), dtype=np.int32)
         assert self._tree is not None
-        distance, index = self._tree.query(self._anchors[group], count + 1, workers=threads)
+        workers = threads if len(group) > _ENOUGH_FOR_THREADS else 1
+        distance, index = self._tree.query(self._anchors[group], count + 1, workers=workers)
         others = index != group[:, None]
         others[others.all(axis=1), -1] = False
         self._radius[group] = distance[:, -1] if count < self.n_sites - 1 else np.inf
+        self._filled[group] = self._radius[group]
         return np.asarray(index[others].reshape(len(group), count), dtype=np.int32)
 
     def _refresh(self, sites: Sites, which: Rows, threads: int) -> None:
         arrays = (sites, self._start, self._counts, self._neighbours, self._distance2)
-        shares = np.array_split(which, min(threads, 1 + len(which) // 10_000))
+        shares = np.array_split(which, threads if len(which) > _ENOUGH_FOR_THREADS else 1)
         if len(shares) == 1:
             refresh_lists(which, *arrays)
             return
-        with ThreadPoolExecutor(len(shares)) as pool:
-            list(pool.map(lambda share: refresh_lists(share, *arrays), shares))
+        with ThreadPoolExecutor(len(shares) - 1) as pool:
+            others = [pool.submit(refresh_lists, share, *arrays) for share in shares[1:]]
+            refresh_lists(shares[0], *arrays)
+            for other in others:
+                other.result()
