@@ -12,7 +12,7 @@ from anisomesh.cli.progress import progress
 from anisomesh.cli.report import summary
 from anisomesh.errors import AnisomeshError
 
-VERTICES = 2000
+VERTICES = 800
 
 
 def command(

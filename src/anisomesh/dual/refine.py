@@ -82,15 +82,15 @@ def refine(
 
     Notes
     -----
-    1. While a cell is no disk, new sites go where it is farthest from its site; nothing else moves, so nothing
-       else breaks. Each new site is farther from all others than the radius of a disk-like cell, so this ends.
+    1. While a cell is no disk, new sites go where it is farthest from its site; nothing else moves, so little else
+       breaks. The rounds are bounded; in practice one or two are enough.
     2. When all cells are disks the dual, glued along bisector chains, is homeomorphic to the surface (a regular
        cell complex; compare the closed ball property of Edelsbrunner and Shah 1997). Points on edges that occur
        twice make it a simplicial mesh.
     3. What this inserted is taken away by edge collapses with the link condition, cheapest first.
     4. Triangles that face away from the surface are turned back by edge flips and moves.
 
-    Where the sites are too few for step 1 (a tube thinner than their distance) the working surface itself, which
+    Where step 1 does not succeed (a tube thinner than the distance between sites) the working surface itself, which
     is valid, is coarsened by the same collapses. The paper inserts sites for every defect and optimises again;
     that makes new defects as it mends old ones.
     """

@@ -28,7 +28,7 @@ __all__ = [
     "twisted_ring",
 ]
 
-DEFAULT_SAMPLE = "ring"
+DEFAULT_SAMPLE = "part"
 
 
 def sphere(subdivisions: int = 3, radius: float = 1.0) -> Surface:

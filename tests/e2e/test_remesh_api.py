@@ -1,0 +1,179 @@
+"""The Python interface: what it accepts, what it returns, what it refuses."""
+
+import numpy as np
+import pytest
+
+import anisomesh
+from anisomesh.errors import MeshError, MetricError, OptionError
+from anisomesh.evaluation.distance import surface_distance
+from anisomesh.evaluation.quality import anisotropic_quality
+from anisomesh.metric.tensor import metric_root
+from anisomesh.surface.mesh import Surface
+from anisomesh.surface.shapes import cad_part, cylinder, open_patch, sphere, torus
+
+FEW = {"lloyd_iterations": 4, "max_iterations": 15}
+
+
+@pytest.fixture(scope="module")
+def ring():
+    return torus(1.0, 0.3, 64, 24)
+
+
+@pytest.fixture(scope="module")
+def result(ring):
+    return anisomesh.remesh(ring, n_vertices=400)
+
+
+def test_closed_input_gives_a_valid_mesh_of_the_asked_size(ring, result):
+    assert result.surface.n_points == result.vertices_asked == 400
+    validity = result.validity
+    assert (validity.closed, validity.oriented) == (True, True)
+    assert (validity.nonmanifold_edges, validity.nonmanifold_vertices, validity.flipped) == (0, 0, 0)
+    assert validity.euler == validity.euler_input == 0
+    assert result.warnings == ()
+    assert surface_distance(ring, result.surface, samples=2000).hausdorff < 0.05
+
+
+def test_triangles_follow_the_metric(result):
+    """The quality in the closed-form metric of the torus is high, and higher than the Euclidean quality."""
+    points = result.surface.points
+    angle = np.arctan2(points[:, 1], points[:, 0])
+    centre = np.stack([np.cos(angle), np.sin(angle), 0 * angle], axis=1)
+    normal = points - centre
+    normal /= np.linalg.norm(normal, axis=1)[:, None]
+    along = np.stack([-np.sin(angle), np.cos(angle), 0 * angle], axis=1)
+    across = np.cross(normal, along)
+    k_across = 1 / 0.3
+    k_along = np.abs((normal * centre).sum(axis=1)) / np.linalg.norm(points[:, :2], axis=1)
+    diagonal = result.prepared.diagonal
+    stretch = np.sqrt(np.clip(k_across * diagonal, 1, 400) / np.clip(k_along * diagonal, 1, 400))
+    tensors = np.eye(3) + (stretch**2 - 1)[:, None, None] * across[:, :, None] * across[:, None, :]
+    quality = anisotropic_quality(points, result.surface.faces, metric_root(tensors)).mean()
+    assert quality > 0.75
+    assert quality > anisotropic_quality(points, result.surface.faces, np.broadcast_to(np.eye(3), (400, 3, 3))).mean()
+
+
+def test_every_kind_of_input_gives_the_same(ring):
+    trimesh = pytest.importorskip("trimesh")
+    pyvista = pytest.importorskip("pyvista")
+    inputs = [
+        (ring,),
+        (ring.points, ring.faces),
+        (trimesh.Trimesh(ring.points, ring.faces, process=False),),
+        (pyvista.PolyData.from_regular_faces(ring.points, ring.faces),),
+    ]
+    results = [anisomesh.remesh(*given, n_vertices=120, **FEW).surface for given in inputs]
+    for other in results[1:]:
+        np.testing.assert_array_equal(other.points, results[0].points)
+        np.testing.assert_array_equal(other.faces, results[0].faces)
+
+
+def test_same_seed_same_bytes_whatever_the_threads(ring):
+    runs = [anisomesh.remesh(ring, n_vertices=300, threads=threads, **FEW).surface for threads in (1, 2, 3)]
+    other = anisomesh.remesh(ring, n_vertices=300, seed=1, **FEW).surface
+    assert len({run.points.tobytes() + run.faces.tobytes() for run in runs}) == 1
+    assert other.points.tobytes() != runs[0].points.tobytes()
+
+
+def test_position_and_scale_of_the_model_come_back(ring):
+    moved = ring.with_points(1000.0 * ring.points + [5e4, 0.0, -2e4])
+    there = anisomesh.remesh(moved, n_vertices=150, **FEW).surface
+    assert surface_distance(moved, there, samples=2000).hausdorff < 200.0
+
+
+def test_components_are_kept():
+    ball = sphere(2)
+    two = Surface(
+        np.concatenate([ball.points, 0.5 * ball.points + [3.0, 0, 0]]),
+        np.concatenate([ball.faces, ball.faces + ball.n_points]),
+    )
+    result = anisomesh.remesh(two, n_vertices=120, **FEW)
+    assert result.validity.components == 2
+    assert result.validity.euler == 4
+    assert result.validity.closed
+
+
+def test_an_open_surface_keeps_its_boundary_loop_and_says_that_it_shrinks():
+    patch = open_patch(lambda x, y: 0.2 * np.cos(3 * x), n=24)
+    result = anisomesh.remesh(patch, n_vertices=150, **FEW)
+    assert result.validity.boundary_loops == 1
+    assert result.validity.nonmanifold_edges == 0
+    assert any("boundary" in warning for warning in result.warnings)
+
+
+def test_own_metric_stretches_as_asked():
+    """Triangles of a cylinder asked to be three times as long around as along."""
+    tube = cylinder(1.0, 4.0, 72, 40, closed=False)
+    tensors = np.broadcast_to(np.diag([1.0, 1.0, 9.0]), (tube.n_points, 3, 3))
+    result = anisomesh.remesh(tube, n_vertices=400, metric=tensors, sharpness=1.0)
+    ends = result.surface.points[result.surface.edges]
+    vector = ends[:, 1] - ends[:, 0]
+    along, around = np.abs(vector[:, 2]), np.linalg.norm(vector[:, :2], axis=1)
+    assert 2.0 < np.sqrt((around**2).mean() / (along**2).mean()) < 4.0
+    plain = anisomesh.remesh(tube, n_vertices=400, metric="uniform", sharpness=1.0)
+    ends = plain.surface.points[plain.surface.edges]
+    vector = ends[:, 1] - ends[:, 0]
+    assert 0.7 < np.sqrt((np.linalg.norm(vector[:, :2], axis=1) ** 2).mean() / (vector[:, 2] ** 2).mean()) < 1.4
+
+
+def test_corners_of_a_machine_part_are_met():
+    part = cad_part(10)
+    result = anisomesh.remesh(part, ratio=0.3)
+    corners = np.array([[0, 0, 0], [0, 1, 0], [3, 0, 0], [3, 1, 0], [0, 0, 0.8], [0, 1, 0.8]])
+    edge = result.surface.edge_lengths.mean()
+    distance = np.linalg.norm(result.surface.points[:, None] - corners[None], axis=2).min(axis=0)
+    assert distance.max() < 0.06 * edge
+    assert result.validity.flipped == 0
+
+
+def test_progress_names_the_stages_and_counts_iterations(ring):
+    steps = []
+    anisomesh.remesh(ring, n_vertices=100, on_step=steps.append, **FEW)
+    assert list(dict.fromkeys(step.stage for step in steps)) == ["prepare", "metric", "embed", "cvt", "dual"]
+    counted = [step.iteration for step in steps if step.energy is not None]
+    assert counted == sorted(counted)
+    assert all(step.iteration <= step.total for step in steps if step.energy is not None)
+
+
+def test_an_exception_in_the_callback_ends_the_work(ring):
+    def stop(step):
+        if step.stage == "cvt":
+            raise KeyboardInterrupt
+
+    with pytest.raises(KeyboardInterrupt):
+        anisomesh.remesh(ring, n_vertices=100, on_step=stop)
+
+
+@pytest.mark.parametrize(
+    ("options", "words"),
+    [
+        ({}, "either n_vertices or ratio"),
+        ({"n_vertices": 100, "ratio": 0.5}, "either n_vertices or ratio"),
+        ({"n_vertices": 3}, "at least 4"),
+        ({"n_vertices": 0}, "at least 4"),
+        ({"n_vertices": 10.5}, "whole number"),
+        ({"ratio": 0.0}, "positive number"),
+        ({"ratio": float("nan")}, "positive number"),
+        ({"n_vertices": 100, "sharpness": 0.5}, "at least 1"),
+        ({"n_vertices": 100, "metric": "fancy"}, "expected one of curvature"),
+        ({"n_vertices": 100, "embedding": "neural"}, "expected 'direct'"),
+        ({"n_vertices": 100, "threads": 0}, "at least 1"),
+        ({"n_vertices": 100, "crease_angle": 200.0}, "0 to 180"),
+        ({"n_vertices": 100, "sharpnes": 7}, "no option 'sharpnes'"),
+    ],
+)
+def test_options_out_of_range_are_refused(ring, options, words):
+    with pytest.raises(OptionError, match=words):
+        anisomesh.remesh(ring, **options)
+
+
+def test_a_metric_of_the_wrong_shape_or_sign_is_refused(ring):
+    with pytest.raises(MetricError, match="one tensor per point"):
+        anisomesh.remesh(ring, n_vertices=100, metric=np.eye(3)[None])
+    with pytest.raises(MetricError, match="positive definite"):
+        anisomesh.remesh(ring, n_vertices=100, metric=np.broadcast_to(-np.eye(3), (ring.n_points, 3, 3)))
+
+
+def test_what_is_no_mesh_is_refused():
+    with pytest.raises(MeshError, match="cannot read a mesh from str"):
+        anisomesh.remesh("bunny.obj", n_vertices=100)
