@@ -33,7 +33,7 @@ COUNT_TOLERANCE = 0.02  # share of the asked vertices by which the result may di
 FINE_POINTS = 5_000  # the working surface has edges no longer than an even mesh of so many points
 EDGE_FACTOR = 1.6  # and no longer than this many distances between sites
 EXCHANGE_AT = 0.6  # share of the iterations after which sites are exchanged
-DENSITY_SHARPNESS = 3.0  # sharpness of the energy that sites are distributed by, over that of the optimisation
+DENSITY_SHARPNESS = 1.5  # sharpness of the energy that sites are distributed by, over that of the optimisation
 MAX_GROWTH = 8  # splitting makes at most so many times the faces, or MAX_SPLIT_FACES
 MAX_SPLIT_FACES = 60_000
 
