@@ -23,6 +23,7 @@ from anisomesh.cvt.sampling import resample_by_energy, sample_surface
 from anisomesh.cvt.voronoi import Evaluation, RestrictedVoronoi
 from anisomesh.embedding.direct import embed
 from anisomesh.metric.tensor import compute_metric
+from anisomesh.pipeline import DENSITY_SHARPNESS
 from anisomesh.surface.geometry import unit_frame
 from anisomesh.surface.mesh import Surface
 from anisomesh.surface.shapes import twisted_ring
@@ -56,7 +57,7 @@ def evaluation(n: int, iterations: int = 100) -> tuple[float, float, int]:
     voronoi.seconds = []
     rng = np.random.default_rng(0)
     sites = lloyd(voronoi, sample_surface(voronoi.points, voronoi.faces, voronoi.facets.area, n, rng), 6)
-    sites = lloyd(voronoi, resample_by_energy(voronoi, sites, 28.0, rng), 3)
+    sites = lloyd(voronoi, resample_by_energy(voronoi, sites, 7.0 * DENSITY_SHARPNESS, rng), 3)
     voronoi.seconds = []
     sites = minimise(voronoi, sites, sharpness=7.0, max_iterations=iterations, tolerance=0.0).sites
     queries = []

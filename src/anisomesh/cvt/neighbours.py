@@ -11,9 +11,10 @@ from scipy.spatial import cKDTree
 from anisomesh._arrays import Sites
 from anisomesh._kernels import clip
 from anisomesh._kernels.neighbours import displacements, limit_radius, refresh_lists
+from anisomesh.cvt.blocks import Blocks
 
 _BASE_NEIGHBOURS = 32
-_FAR = 0.3  # of the median list radius: when a site is this far from its anchor, sites are anchored anew
+_FAR = 0.45  # of the median list radius: when a site is this far from its anchor, sites are anchored anew
 _NEAR = 0.1  # and these are the ones farther from their anchors than this
 _MOST = 0.3  # of all sites; if more are to be anchored anew, all lists are rebuilt
 _SPARE = 1.3  # a list that proves too short is made this much longer than needed
@@ -33,10 +34,11 @@ class NeighbourLists:
     -----
     Every site i has an anchor a_i, where it once was, and a radius r_i; its list holds every site whose anchor is
     within r_i of a_i. Hence it holds every site that is *now* within r_i - |x_i - a_i| - max_j |x_j - a_j| of the
-    site (after Verlet 1967), and most calls need no search: distances are recomputed and the list, almost sorted,
-    is sorted again. When a site has moved far it is anchored anew where it is, with a new list; another site
-    that has it in its list loses nothing, one that has not gets a smaller radius. A list that proves too short is
-    sought again, longer, among the anchors.
+    site (after Verlet 1967), where j runs over the sites in blocks near by; those in others are too far to matter.
+    So most calls need no search: distances are recomputed and the list, almost sorted, is sorted again. When a site
+    has moved far it is anchored anew where it is, with a new list; another site that has it in its list loses
+    nothing, one that has not gets a smaller radius. A list that proves too short is sought again, longer, among the
+    anchors.
     """
 
     def __init__(self) -> None:
@@ -50,6 +52,9 @@ class NeighbourLists:
         self._start: npt.NDArray[np.int64]
         self._neighbours: npt.NDArray[np.int32]
         self._typical = 0.0
+        self._blocks: Blocks
+        self._reach: Floats | None = None  # largest radius in each block, when the near blocks were found
+        self._near: npt.NDArray[np.bool_]
         self._used = 0  # entries of the lists that are taken
         self._tree: cKDTree | None = None  # of the anchors
         self._current: cKDTree | None = None  # of the positions in the last call of table
@@ -60,15 +65,15 @@ class NeighbourLists:
         if len(sites) != self.n_sites:
             self._rebuild(sites, threads)
         self._moved = np.empty(self.n_sites)
-        self._farthest = displacements(sites, self._anchors, self._moved)
-        if self._farthest > _FAR * self._typical:
-            movers = np.flatnonzero(self._moved > _NEAR * self._typical)
+        if displacements(sites, self._anchors, self._moved) > _FAR * self._typical:
+            restless = self._blocks.largest(self._moved) > _FAR * self._typical
+            movers = np.flatnonzero(restless[self._blocks.of] & (self._moved > _NEAR * self._typical))
             crowded = self._used > _CROWDED * self._counts.sum()
             if crowded or len(movers) > _MOST * self.n_sites:
                 self._rebuild(sites, threads)
             else:
                 self._anchor(sites, movers, threads)
-            self._farthest = displacements(sites, self._anchors, self._moved)
+            displacements(sites, self._anchors, self._moved)
         self._refresh(sites, np.arange(self.n_sites), threads)
         return self._as_table(sites)
 
@@ -78,12 +83,13 @@ class NeighbourLists:
         The positions must be those of the last call of ``table``.
         """
         short = np.flatnonzero(needed)
-        wanted = _SPARE * needed[short] + self._moved[short] + self._farthest
+        wanted = _SPARE * needed[short] + self._worn()[short]
         limited = self._radius[short] < self._filled[short]  # a search as long as the last may do
         counts = np.minimum(np.where(limited, 1, 2) * self._counts[short], self.n_sites - 1)
         while len(short):
             for count in np.unique(counts).tolist():
                 self._append(short[counts == count], count, threads)
+            self._reach = None
             unmet = self._radius[short] < wanted
             self._refresh(sites, short[~unmet], threads)
             short, wanted = short[unmet], wanted[unmet]
@@ -97,8 +103,19 @@ class NeighbourLists:
         return np.asarray(self._current.query(queries, workers=threads)[1], dtype=np.int32)
 
     def _as_table(self, sites: Sites) -> clip.Sites:
-        complete = self._radius - self._moved - self._farthest
+        complete = self._radius - self._worn()
         return clip.Sites(sites, self._start, self._counts, self._neighbours, self._distance2, complete)
+
+    def _worn(self) -> Floats:
+        """Return by how much the radius within which each list is complete has shrunk since the anchors (S,)."""
+        margin = self._typical if np.isfinite(self._typical) else 0.0
+        if self._reach is None:
+            self._reach = largest = self._blocks.largest(self._radius)
+            self._near = self._blocks.near(self._anchors, np.nextafter(largest + margin, np.inf))
+        moved = self._blocks.largest(self._moved)
+        # sites in blocks that are not near are farther than the radius by the margin
+        around = np.maximum(np.where(self._near, moved, 0.0).max(axis=1), moved.max() - margin)
+        return np.asarray(self._moved + around[self._blocks.of])
 
     def _rebuild(self, sites: Sites, threads: int) -> None:
         base = min(_BASE_NEIGHBOURS, len(sites) - 1)
@@ -107,6 +124,8 @@ class NeighbourLists:
             self._counts = np.full(self.n_sites, base)
         self._anchors = np.array(sites)
         self._tree = cKDTree(self._anchors)
+        self._blocks = Blocks(self._anchors)
+        self._reach = None
         self._radius, self._filled = np.empty(self.n_sites), np.empty(self.n_sites)
         self._start = np.zeros(self.n_sites, dtype=np.int64)
         counts = np.clip(self._counts, base, _LONGEST_KEPT)
@@ -132,6 +151,7 @@ class NeighbourLists:
     def _anchor(self, sites: Sites, movers: Rows, threads: int) -> None:
         """Anchor these sites where they are now."""
         self._anchors[movers] = sites[movers]
+        self._reach = None
         self._tree = cKDTree(self._anchors)
         moved_tree = cKDTree(self._anchors[movers])
         probes = min(_PROBES, len(movers))
