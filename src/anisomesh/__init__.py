@@ -14,8 +14,10 @@ from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
     from anisomesh.errors import AnisomeshError, MeshError, MeshFileError, MetricError, OptionError
+    from anisomesh.options import RemeshOptions, StepInfo
     from anisomesh.picture import side_by_side
-    from anisomesh.pipeline import RemeshOptions, RemeshResult, StepInfo, remesh, save_rvd
+    from anisomesh.pipeline import remesh
+    from anisomesh.result import RemeshResult, save_rvd
     from anisomesh.surface.io import load, save
     from anisomesh.surface.mesh import Surface
     from anisomesh.surface.shapes import sample
@@ -47,15 +49,15 @@ _HOME = {
     "MeshFileError": "errors",
     "MetricError": "errors",
     "OptionError": "errors",
-    "RemeshOptions": "pipeline",
-    "RemeshResult": "pipeline",
-    "StepInfo": "pipeline",
+    "RemeshOptions": "options",
+    "RemeshResult": "result",
+    "StepInfo": "options",
     "Surface": "surface.mesh",
     "load": "surface.io",
     "remesh": "pipeline",
     "sample": "surface.shapes",
     "save": "surface.io",
-    "save_rvd": "pipeline",
+    "save_rvd": "result",
     "side_by_side": "picture",
 }
 

@@ -3,9 +3,9 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from contextlib import contextmanager
-from dataclasses import dataclass, fields, replace
+from dataclasses import fields, replace
 from typing import Any
 
 import numpy as np
@@ -19,14 +19,13 @@ from anisomesh.dual.refine import Refined, refine
 from anisomesh.embedding.direct import embed
 from anisomesh.errors import MeshError, MetricError, OptionError
 from anisomesh.evaluation.validity import Validity, check_validity
-from anisomesh.metric.tensor import METRIC_NAMES, MetricName, compute_metric
-from anisomesh.result import RemeshResult, save_rvd
+from anisomesh.metric.tensor import compute_metric
+from anisomesh.options import OnStep, RemeshOptions, StepInfo
+from anisomesh.result import RemeshResult
 from anisomesh.surface.geometry import unit_frame
 from anisomesh.surface.mesh import Surface
 from anisomesh.surface.prepare import Prepared, prepare
 from anisomesh.surface.subdivide import split_long_edges
-
-__all__ = ["RemeshOptions", "RemeshResult", "StepInfo", "remesh", "save_rvd"]
 
 MIN_VERTICES = 4
 COUNT_TOLERANCE = 0.02  # share of the asked vertices by which the result may differ without a warning
@@ -36,76 +35,6 @@ EXCHANGE_AT = 0.6  # share of the iterations after which sites are exchanged
 DENSITY_SHARPNESS = 1.5  # sharpness of the energy that sites are distributed by, over that of the optimisation
 MAX_GROWTH = 8  # splitting makes at most so many times the faces, or MAX_SPLIT_FACES
 MAX_SPLIT_FACES = 60_000
-
-
-@dataclass(frozen=True, kw_only=True)
-class RemeshOptions:
-    """How to remesh.
-
-    Attributes
-    ----------
-    sharpness
-        The factor s of the normal metric, at least 1: 1 is the plain CVT with the most regular elements, 7 the
-        paper's value, larger values keep the surface and its creases more exactly.
-    final_sharpness
-        If given, the optimisation ends with this factor (30 brings vertices onto corners and creases).
-    metric
-        ``"curvature"``, ``"approximation"``, ``"uniform"``, or tensors (V, 3, 3) at the points of the input, in
-        model units.
-    embedding
-        ``"direct"``.
-    seed
-        Of the start positions; the same seed and input give the same result.
-    threads
-        Worker threads; they do not change the result.
-    lloyd_iterations, max_iterations
-        Iterations of Lloyd's algorithm at the start and bound on those of L-BFGS after it.
-    weld_tolerance
-        Points of the input up to this distance (model units) become one.
-    crease_angle
-        Edges of the input whose faces differ by more than this many degrees are creases, onto which the vertices of
-        their cells are put; 180 for none. The plain CVT (``sharpness`` 1) has none.
-    """
-
-    sharpness: float = 7.0
-    final_sharpness: float | None = None
-    metric: MetricName | npt.NDArray[Any] = "curvature"
-    embedding: str = "direct"
-    seed: int = 0
-    threads: int = 2
-    lloyd_iterations: int = 9
-    max_iterations: int = 100
-    weld_tolerance: float = 0.0
-    crease_angle: float = 45.0
-
-    def __post_init__(self) -> None:
-        for name in ("sharpness", "final_sharpness"):
-            value = getattr(self, name)
-            if value is not None and not (np.isfinite(value) and value >= 1.0):
-                raise OptionError(f"{name} = {value}; expected a finite number of at least 1 (1 is the plain CVT)")
-        if isinstance(self.metric, str) and self.metric not in METRIC_NAMES:
-            raise OptionError(f"metric = {self.metric!r}; expected one of {', '.join(METRIC_NAMES)}, or tensors")
-        if self.embedding != "direct":
-            raise OptionError(f"embedding = {self.embedding!r}; expected 'direct'")
-        if not 0.0 <= self.crease_angle <= 180.0:
-            raise OptionError(f"crease_angle = {self.crease_angle}; expected 0 to 180 degrees")
-        for name, low in (("seed", 0), ("threads", 1), ("lloyd_iterations", 0), ("max_iterations", 0)):
-            if getattr(self, name) < low:
-                raise OptionError(f"{name} = {getattr(self, name)}; expected at least {low}")
-
-
-@dataclass(frozen=True, kw_only=True)
-class StepInfo:
-    """One step of a run: the stage, iteration ``iteration`` of at most ``total``, the energy if there is one."""
-
-    stage: str
-    iteration: int = 0
-    total: int = 0
-    energy: float | None = None
-    message: str = ""
-
-
-OnStep = Callable[[StepInfo], None]
 
 
 def remesh(

@@ -13,7 +13,7 @@ from anisomesh.cli.progress import Display, announce_compilation
 from anisomesh.cli.report import write_json
 
 if TYPE_CHECKING:
-    from anisomesh.pipeline import RemeshResult
+    from anisomesh.result import RemeshResult
     from anisomesh.surface.mesh import Surface
 
 
@@ -70,7 +70,7 @@ class Outputs:
         if self.report is not None:
             write_json(facts, self.report)
         if self.rvd is not None:
-            from anisomesh.pipeline import save_rvd
+            from anisomesh.result import save_rvd
 
             save_rvd(result, self.rvd)
         if self.picture is not None:

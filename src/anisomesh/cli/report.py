@@ -53,7 +53,7 @@ def summary(report: dict[str, Any], written: Sequence[Path], notes: Sequence[str
     Parameters
     ----------
     report
-        What :meth:`anisomesh.pipeline.RemeshResult.report` returns.
+        What :meth:`anisomesh.result.RemeshResult.report` returns.
     written
         The files that were written, in order.
     notes

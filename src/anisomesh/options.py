@@ -1,0 +1,83 @@
+"""How to remesh, and how a run reports its progress."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+
+from anisomesh.errors import OptionError
+from anisomesh.metric.tensor import METRIC_NAMES, MetricName
+
+
+@dataclass(frozen=True, kw_only=True)
+class RemeshOptions:
+    """How to remesh.
+
+    Attributes
+    ----------
+    sharpness
+        The factor s of the normal metric, at least 1: 1 is the plain CVT with the most regular elements, 7 the
+        paper's value, larger values keep the surface and its creases more exactly.
+    final_sharpness
+        If given, the optimisation ends with this factor (30 brings vertices onto corners and creases).
+    metric
+        ``"curvature"``, ``"approximation"``, ``"uniform"``, or tensors (V, 3, 3) at the points of the input, in
+        model units.
+    embedding
+        ``"direct"``.
+    seed
+        Of the start positions; the same seed and input give the same result.
+    threads
+        Worker threads; they do not change the result.
+    lloyd_iterations, max_iterations
+        Iterations of Lloyd's algorithm at the start and bound on those of L-BFGS after it.
+    weld_tolerance
+        Points of the input up to this distance (model units) become one.
+    crease_angle
+        Edges of the input whose faces differ by more than this many degrees are creases, onto which the vertices of
+        their cells are put; 180 for none. The plain CVT (``sharpness`` 1) has none.
+    """
+
+    sharpness: float = 7.0
+    final_sharpness: float | None = None
+    metric: MetricName | npt.NDArray[Any] = "curvature"
+    embedding: str = "direct"
+    seed: int = 0
+    threads: int = 2
+    lloyd_iterations: int = 9
+    max_iterations: int = 100
+    weld_tolerance: float = 0.0
+    crease_angle: float = 45.0
+
+    def __post_init__(self) -> None:
+        for name in ("sharpness", "final_sharpness"):
+            value = getattr(self, name)
+            if value is not None and not (np.isfinite(value) and value >= 1.0):
+                raise OptionError(f"{name} = {value}; expected a finite number of at least 1 (1 is the plain CVT)")
+        if isinstance(self.metric, str) and self.metric not in METRIC_NAMES:
+            raise OptionError(f"metric = {self.metric!r}; expected one of {', '.join(METRIC_NAMES)}, or tensors")
+        if self.embedding != "direct":
+            raise OptionError(f"embedding = {self.embedding!r}; expected 'direct'")
+        if not 0.0 <= self.crease_angle <= 180.0:
+            raise OptionError(f"crease_angle = {self.crease_angle}; expected 0 to 180 degrees")
+        for name, low in (("seed", 0), ("threads", 1), ("lloyd_iterations", 0), ("max_iterations", 0)):
+            if getattr(self, name) < low:
+                raise OptionError(f"{name} = {getattr(self, name)}; expected at least {low}")
+
+
+@dataclass(frozen=True, kw_only=True)
+class StepInfo:
+    """One step of a run: the stage, iteration ``iteration`` of at most ``total``, the energy if there is one."""
+
+    stage: str
+    iteration: int = 0
+    total: int = 0
+    energy: float | None = None
+    message: str = ""
+
+
+OnStep = Callable[[StepInfo], None]
