@@ -3,7 +3,7 @@
 import naive_rvd as naive
 import numpy as np
 import pytest
-from test_dual_mesh import assert_closed_manifold
+from dual_cases import assert_closed_manifold
 
 from anisomesh.cvt.optimise import lloyd
 from anisomesh.cvt.voronoi import RestrictedVoronoi

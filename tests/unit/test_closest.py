@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-from test_validity import wedge
+from creases import wedge
 
 from anisomesh.surface.closest import ClosestPoints
 from anisomesh.surface.mesh import Surface

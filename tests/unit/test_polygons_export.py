@@ -4,7 +4,7 @@ import meshio
 import naive_rvd as naive
 import numpy as np
 import pytest
-from test_dual_mesh import dual_case
+from dual_cases import dual_case
 
 from anisomesh.dual.polygons import N_COLOURS, polygon_mesh, save_polygons
 from anisomesh.errors import MeshFileError

@@ -4,6 +4,7 @@ import json
 
 import numpy as np
 import pytest
+from creases import wedge
 
 from anisomesh.evaluation.validity import check_validity, flipped_faces
 from anisomesh.surface.mesh import Surface
@@ -76,19 +77,6 @@ def test_values_can_be_written_as_json():
 def test_coarse_remesh_has_no_flipped_triangle_and_its_reverse_nothing_else(coarse, fine):
     assert not flipped_faces(coarse, fine).any()
     assert flipped_faces(with_faces(coarse, coarse.faces[:, ::-1]), fine).all()
-
-
-def wedge(angle):
-    """A roof of two long rectangles meeting at a crest with this opening angle, crest along y at the origin."""
-    run, drop = np.sin(angle / 2), -np.cos(angle / 2)
-    y = np.linspace(-1, 1, 9)
-    rows = [np.stack([np.full(9, x), y, np.full(9, z)], axis=1) for x, z in ((-run, drop), (0.0, 0.0), (run, drop))]
-    faces = []
-    for row in range(2):
-        for k in range(8):
-            a, b = 9 * row + k, 9 * (row + 1) + k
-            faces += [[a, b, b + 1], [a, b + 1, a + 1]]
-    return Surface(np.concatenate(rows), np.array(faces))
 
 
 @pytest.mark.parametrize("degrees", [10, 40, 90, 150])

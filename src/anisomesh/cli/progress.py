@@ -124,9 +124,7 @@ def progress(quiet: bool) -> Display:
 
 def announce_compilation(display: Display) -> None:
     """Say so if the numeric kernels are about to be compiled, which happens once per installation."""
-    try:
-        from anisomesh._kernels.warmup import kernels_cached
-    except ImportError:
-        return
+    from anisomesh._kernels.warmup import kernels_cached
+
     if not kernels_cached():
         display.note("compiling the numeric kernels (once per installation, up to a minute) ...")

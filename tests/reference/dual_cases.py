@@ -1,0 +1,28 @@
+"""Duals of given sites, and what a closed manifold is, for several test files."""
+
+import numpy as np
+
+from anisomesh.cvt.optimise import lloyd
+from anisomesh.cvt.voronoi import RestrictedVoronoi
+from anisomesh.dual.cells import cells_of
+from anisomesh.dual.triangulate import dual_mesh
+from anisomesh.surface import topology
+from anisomesh.surface.mesh import Surface
+
+
+def dual_case(surface, sites, points=None, iterations=0):
+    """Return diagram, cells and dual of sites on a surface, embedded in its own space unless ``points`` are given."""
+    voronoi = RestrictedVoronoi(surface.points if points is None else points, surface.faces)
+    sites = lloyd(voronoi, sites, iterations)
+    diagram = voronoi.diagram(sites)
+    ordered = Surface(surface.points, voronoi.faces)
+    cells = cells_of(diagram, ordered.face_neighbours, voronoi.facets.area)
+    return diagram, cells, dual_mesh(diagram, cells, ordered.face_edges)
+
+
+def assert_closed_manifold(faces, euler):
+    edges, face_edges = topology.edges_of(faces)
+    assert np.all(np.bincount(face_edges.ravel(), minlength=len(edges)) == 2)
+    assert topology.is_oriented(faces)
+    assert topology.count_nonmanifold_points(faces) == 0
+    assert topology.euler_characteristic(faces) == euler
