@@ -67,7 +67,7 @@ def summary(report: dict[str, Any], written: Sequence[Path], notes: Sequence[str
         ("faces", f"{report['faces']:,}"),
         ("surface", describe_validity(report["validity"])),
         ("stretch", f"mean {stretch['mean']:.2f}, largest {stretch['max']:.2f} (1 = equilateral)"),
-        ("optimiser", f"{report['status']} after {counted(report['iterations'], 'iteration')}{energy}"),
+        ("optimiser", f"{counted(report['iterations'], 'iteration')}{energy}: {report['status']}"),
         ("seconds", f"{seconds['total']:.2f} ({stages})"),
         *(("prepared", note) for note in notes),
         *(("warning", text) for text in report["warnings"]),
