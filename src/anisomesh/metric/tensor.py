@@ -17,7 +17,7 @@ from anisomesh.surface.mesh import Surface
 MetricName = Literal["curvature", "approximation", "uniform"]
 METRIC_NAMES: tuple[MetricName, ...] = ("curvature", "approximation", "uniform")
 DEFAULT_LIMITS = (1.0, 400.0)
-DEFAULT_SMOOTHING = 1
+DEFAULT_SMOOTHING = 3
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -109,6 +109,10 @@ def curvature_metric(
     the curvature fit has smoothed already. On training meshes with vertex noise of 0.3 edge lengths one pass is
     closest to the metric of the clean mesh, and it brings most of the gain in how well the metric can be embedded;
     each further pass only takes stretch away.
+
+    Three passes are the default: on remeshes of meshes kept for development at 20 % of the vertices they leave the
+    distance to the surface as it is without smoothing, and the triangles fit the metric better (G up by 0.013); more
+    passes gain little and lengthen the reach into creases.
 
     References
     ----------
