@@ -8,7 +8,7 @@ import numpy.typing as npt
 Floats = npt.NDArray[np.float64]
 
 _BLOCK = 64  # points in a block, at least
-_MAX_BLOCKS = 512
+_MAX_BLOCKS = 128
 
 
 class Blocks:

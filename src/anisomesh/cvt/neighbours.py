@@ -89,7 +89,8 @@ class NeighbourLists:
         while len(short):
             for count in np.unique(counts).tolist():
                 self._append(short[counts == count], count, threads)
-            self._reach = None
+            if self._reach is not None and (self._radius[short] > self._reach[self._blocks.of[short]]).any():
+                self._reach = None
             unmet = self._radius[short] < wanted
             self._refresh(sites, short[~unmet], threads)
             short, wanted = short[unmet], wanted[unmet]
