@@ -58,8 +58,7 @@ def resample_by_energy(voronoi: RestrictedVoronoi, sites: Sites, sharpness: floa
     -----
     In an optimal tessellation cells have equal energies (Gersho 1979), but descent moves sites only near by. The
     density is the area times the square root of (energy / area^2) of the cell, which is constant where the plain
-    energy dominates and grows where the surface leaves the tangent plane within a cell. Starting from there
-    instead of from an even sample halves the mean squared distance between surface and result.
+    energy dominates and grows where the surface leaves the tangent plane within a cell.
     """
     evaluation = voronoi.evaluate(sites, sharpness)
     density = np.sqrt(np.maximum(evaluation.cell_energy, 0.0)) / np.maximum(evaluation.mass, np.finfo(np.float64).tiny)

@@ -110,9 +110,8 @@ def curvature_metric(
     closest to the metric of the clean mesh, and it brings most of the gain in how well the metric can be embedded;
     each further pass only takes stretch away.
 
-    Three passes are the default: on remeshes of meshes kept for development at 20 % of the vertices they leave the
-    distance to the surface as it is without smoothing, and the triangles fit the metric better (G up by 0.013); more
-    passes gain little and lengthen the reach into creases.
+    Three passes are the default: fewer leave noise in the metric that triangles cannot follow, more gain little and
+    lengthen the reach into creases.
 
     References
     ----------
