@@ -6,19 +6,21 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from anisomesh.cvt.neighbours import NeighbourLists
+from anisomesh.cvt.workers import Workers
 
 
 def assert_lists_hold(table, sites):
-    """Every list is sorted, has true distances, no duplicates, and all sites within its complete radius."""
-    distance2 = ((sites[:, None] - sites[None]) ** 2).sum(axis=2)
+    """Every list is sorted, has true distances up to its wear, no duplicates, all sites within its complete radius."""
+    distance = np.sqrt(((sites[:, None] - sites[None]) ** 2).sum(axis=2))
     for site in range(len(sites)):
         listed = table.neighbours[table.start[site] : table.start[site] + table.length[site]]
-        promised = table.distance2[table.start[site] : table.start[site] + table.length[site]]
-        np.testing.assert_allclose(promised, distance2[site, listed], rtol=1e-12, atol=1e-300)
+        promised = table.distance[table.start[site] : table.start[site] + table.length[site]]
+        true = distance[site, listed]
+        assert np.all(np.abs(promised - true) <= table.worn[site] + 1e-12 * np.maximum(promised, true))
         assert np.all(np.diff(promised) >= 0)
         assert len(set(listed.tolist())) == len(listed)
         assert site not in listed
-        near = np.flatnonzero(distance2[site] < max(table.complete[site], 0.0) ** 2 * (1 - 1e-12))
+        near = np.flatnonzero(distance[site] < max(table.complete[site], 0.0) * (1 - 1e-12))
         assert set(near.tolist()) - {site} <= set(listed.tolist())
 
 
@@ -35,32 +37,44 @@ def test_lists_stay_complete_while_the_sites_move(n, dimension, moves, seed, dup
     sites = rng.random((n, dimension))
     if duplicates:
         sites = sites[rng.integers(max(1, n // 3), size=n)]
-    lists = NeighbourLists()
-    assert_lists_hold(lists.table(sites, 1), sites)
+    lists = NeighbourLists(Workers(1))
+    assert_lists_hold(lists.table(sites), sites)
     for size, share in moves:
         chosen = rng.random(n) < share
         sites = sites + 10.0**size * chosen[:, None] * rng.normal(size=sites.shape)
-        assert_lists_hold(lists.table(sites, 1), sites)
+        assert_lists_hold(lists.table(sites), sites)
         needed = np.where(rng.random(n) < 0.2, 2.0 * rng.random(n), 0.0)
-        table = lists.grow(sites, needed, 1)
+        table = lists.grow(sites, needed)
         assert np.all(table.complete[needed > 0] >= needed[needed > 0])
         assert_lists_hold(table, sites)
 
 
+def test_exact_lists_have_true_distances_whatever_came_before():
+    rng = np.random.default_rng(5)
+    lists = NeighbourLists(Workers(1))
+    sites = rng.random((300, 3))
+    for _ in range(4):
+        assert_lists_hold(lists.table(sites), sites)
+        sites = sites + 1e-4 * rng.normal(size=sites.shape)
+    assert lists.table(sites).worn.any()
+    assert not lists.table(sites, exact=True).worn.any()
+    assert_lists_hold(lists.table(sites, exact=True), sites)
+
+
 def test_number_of_sites_may_change():
     rng = np.random.default_rng(0)
-    lists = NeighbourLists()
+    lists = NeighbourLists(Workers(1))
     for n in (50, 3, 1, 200):
         sites = rng.random((n, 3))
-        assert_lists_hold(lists.table(sites, 1), sites)
+        assert_lists_hold(lists.table(sites), sites)
 
 
 def test_tied_neighbours_are_sorted_by_index():
     sites = np.stack(np.meshgrid(*3 * [np.arange(4.0)]), axis=-1).reshape(-1, 3)
-    table = NeighbourLists().table(sites, 1)
+    table = NeighbourLists(Workers(1)).table(sites)
     for site in range(len(sites)):
         part = slice(table.start[site], table.start[site] + table.length[site])
-        keys = list(zip(table.distance2[part].tolist(), table.neighbours[part].tolist(), strict=True))
+        keys = list(zip(table.distance[part].tolist(), table.neighbours[part].tolist(), strict=True))
         assert keys == sorted(keys)
 
 
@@ -68,16 +82,32 @@ def test_tied_neighbours_are_sorted_by_index():
 def test_lists_of_many_sites_do_not_depend_on_threads(threads):
     rng = np.random.default_rng(1)
     sites = rng.random((3500, 3))
-    tables = [NeighbourLists().table(sites, count) for count in (1, threads)]
+    tables = [NeighbourLists(Workers(count)).table(sites) for count in (1, threads)]
     np.testing.assert_array_equal(tables[0].neighbours, tables[1].neighbours)
-    np.testing.assert_array_equal(tables[0].distance2, tables[1].distance2)
+    np.testing.assert_array_equal(tables[0].distance, tables[1].distance)
 
 
 def test_nearest_is_the_nearest_site():
     rng = np.random.default_rng(2)
-    lists = NeighbourLists()
+    lists = NeighbourLists(Workers(1))
     for _ in range(2):
         sites, queries = rng.random((40, 5)), rng.random((30, 5))
-        lists.table(sites, 1)
+        lists.table(sites)
         wanted = ((queries[:, None] - sites[None]) ** 2).sum(axis=2).argmin(axis=1)
-        np.testing.assert_array_equal(lists.nearest(queries, sites, 1), wanted)
+        np.testing.assert_array_equal(lists.nearest(queries, sites), wanted)
+
+
+def test_near_is_not_beaten_by_a_listed_neighbour():
+    rng = np.random.default_rng(3)
+    lists = NeighbourLists(Workers(1))
+    sites, queries = rng.random((400, 4)), rng.random((50, 4))
+    lists.table(sites)
+    sites = sites + 0.02 * rng.normal(size=sites.shape)
+    table = lists.table(sites)
+    found = lists.near(queries, sites)
+    for query, site in zip(queries, found, strict=True):
+        listed = table.neighbours[table.start[site] : table.start[site] + table.length[site]]
+        best = ((sites[listed] - query) ** 2).sum(axis=1).min()
+        assert ((sites[site] - query) ** 2).sum() <= best
+    exact = ((queries[:, None] - sites[None]) ** 2).sum(axis=2).argmin(axis=1)
+    assert (found == exact).mean() > 0.9

@@ -15,15 +15,15 @@ clockwise in the facet.
 from typing import NamedTuple
 
 import numpy as np
-from numba import njit
 
+from .compiled import inlined, kernel
 from .predicates import corner_side, edge_side, interior_side
 
 OK = 0
 LIST_TOO_SHORT = -1  # a neighbour list ended before the security radius
 BUFFER_TOO_SMALL = -2  # more polygons, vertices or candidate sites on a facet than the workspace holds
 NO_OWNER = -3  # the start site of a facet has no part of it
-START_TOO_FAR = -4  # the list of the start site is too short: perhaps another site is nearer
+START_TOO_FAR = -4  # the list of the first site with a part is too short: perhaps another site is nearer
 
 _UNIT_ROUNDOFF = 1.1102230246251565e-16
 _SLOP = 1e-9  # relative inflation of the security radius, far above its rounding error
@@ -40,13 +40,14 @@ class Facets(NamedTuple):
 
 
 class Sites(NamedTuple):
-    """Sites and their neighbour lists, sorted by distance."""
+    """Sites and their neighbour lists, sorted by a distance that may be out of date by a bound."""
 
     positions: np.ndarray  # (S, d)
     start: np.ndarray  # (S,) first neighbour of each site
     length: np.ndarray  # (S,) number of its neighbours
     neighbours: np.ndarray  # (N,) int32
-    distance2: np.ndarray  # (N,) squared distances
+    distance: np.ndarray  # (N,) of a site to its neighbours, when the list was last sorted
+    worn: np.ndarray  # (S,) by how much the distances in a list may be too large
     complete: np.ndarray  # (S,) radius within which the list of a site holds every other site
 
 
@@ -75,7 +76,7 @@ _LABEL = 5  # label of the edge that leaves the vertex
 _VALUE = 6  # form of the clipping bisector
 
 
-@njit(cache=True, nogil=True, forceinline=True)
+@inlined
 def _fill_row(table, row, site, positions, points, a, b, c):
     """Write the squared distances of a site to the three corners."""
     wa = 0.0
@@ -94,7 +95,7 @@ def _fill_row(table, row, site, positions, points, a, b, c):
     table[row, 2] = wc
 
 
-@njit(cache=True, nogil=True)
+@kernel
 def _exact_side(table, candidate, i, before, after, j):
     """Return the exact side (1 or -1) of the vertex between two labelled edges of cell i against site j."""
     site = candidate
@@ -108,7 +109,7 @@ def _exact_side(table, candidate, i, before, after, j):
     return interior_side(w[i], w[before], w[after], w[j], site[i], site[before], site[after], site[j])
 
 
-@njit(cache=True, nogil=True, forceinline=True)
+@inlined
 def _intersect(work, source, p, q, m, size):
     """Write the point of the edge p q where the form vanishes, and a bound on its error, as vertex m.
 
@@ -130,7 +131,7 @@ def _intersect(work, source, p, q, m, size):
     work[1 - source, m, _ERROR] = parents + share * (length + 2.0 * parents) + 4.0 * _UNIT_ROUNDOFF
 
 
-@njit(cache=True, nogil=True, forceinline=True)
+@inlined
 def _classify(work, table, candidate, source, n, i, j, fa, fb, fc):
     """Decide which vertices site j takes; return their number and the first of them in cyclic order."""
     size = abs(fa) + abs(fb) + abs(fc)
@@ -158,7 +159,7 @@ def _classify(work, table, candidate, source, n, i, j, fa, fb, fc):
     return n_lost, first
 
 
-@njit(cache=True, nogil=True, forceinline=True)
+@inlined
 def _cut(work, source, n, n_lost, first, j, size):
     """Write the polygon without its lost vertices into the other buffer; return its vertex count."""
     target = 1 - source
@@ -180,7 +181,7 @@ def _cut(work, source, n, n_lost, first, j, size):
     return kept + 2
 
 
-@njit(cache=True, nogil=True, forceinline=True)
+@inlined
 def _measure(work, source, first, n, wa, wb, wc, sa, sb, sc, slack, spread):
     """Bound the squared distances of the vertices from ``first`` on; return the largest bound of all.
 
@@ -198,7 +199,7 @@ def _measure(work, source, first, n, wa, wb, wc, sa, sb, sc, slack, spread):
     return largest
 
 
-@njit(cache=True, nogil=True, forceinline=True)
+@inlined
 def _whole_facet(work, wa, wb, wc, slack):
     """Start the polygon as the whole facet."""
     for k in range(3):
@@ -210,15 +211,15 @@ def _whole_facet(work, wa, wb, wc, slack):
     work[0, 2, _SQUARE] = wc + slack
 
 
-@njit(cache=True, nogil=True)
+@kernel
 def clip_facet(facet, owner, facets, sites, ws):
     """Write the polygons of all cells on a facet into the workspace.
 
-    ``owner`` is a site likely to own a part of the facet. Returns the number of polygons or a negative status;
-    lists that are too short are noted in the workspace, all those on the facet at once. One function on purpose:
-    taking the arrays out of their tuples once per facet instead of once per clip makes it twice as fast.
+    ``owner`` is a site likely to own a part of the facet. Returns the number of polygons or a negative status, with
+    START_TOO_FAR the slot of the site in question as that of the first polygon. Lists that are too short are noted in
+    the workspace, all those on the facet at once.
     """
-    positions, start, count, neighbours, distance2, complete = sites
+    positions, start, count, neighbours, distance, worn, complete = sites
     (
         clock,
         stamp,
@@ -264,11 +265,13 @@ def clip_facet(facet, owner, facets, sites, ws):
         spread = 2.0 * (max(wa, wb, wc) + slack + 3.0 * max(sa, sb, sc))
         _whole_facet(work, wa, wb, wc, slack)
         radius2 = max(wa, wb, wc) + slack
+        wear = worn[site]
         n = 3
         source = 0
         rival = -1
         for k in range(start[site], start[site] + count[site]):
-            if distance2[k] > 4.0 * radius2 * (1.0 + _SLOP):
+            least = distance[k] - wear
+            if least > 0.0 and least * least > 4.0 * radius2 * (1.0 + _SLOP):
                 break
             other = neighbours[k]
             if stamp[other] == now:
@@ -299,7 +302,7 @@ def clip_facet(facet, owner, facets, sites, ws):
             source = 1 - source
             radius2 = _measure(work, source, n - 2, n, wa, wb, wc, sa, sb, sc, slack, spread)
         if n == 0:
-            # only the start site can have no part of the facet; whatever took the last of it is tried next
+            # only the first sites can have no part of the facet; whatever took the last of it is tried next
             if n_polygons > 0 or queued[rival]:
                 return NO_OWNER
             queued[rival] = 1
@@ -310,6 +313,7 @@ def clip_facet(facet, owner, facets, sites, ws):
         if needed > complete[site]:
             all_needed[site] = max(all_needed[site], needed)
             if n_polygons == 0:
+                polygon_slot[0] = i
                 return START_TOO_FAR
             short = True
         if n_vertices + n > out_label.shape[0]:

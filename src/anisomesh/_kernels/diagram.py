@@ -1,11 +1,10 @@
 """Writing the restricted Voronoi diagram in symbolic form, chunk by chunk."""
 
-from numba import njit
+from .clip import START_TOO_FAR, clip_facet
+from .compiled import kernel
 
-from .clip import clip_facet
 
-
-@njit(cache=True, nogil=True)
+@kernel
 def count_chunk(chunk, owners, facets, sites, ws, problems):
     """Return the numbers of polygons, polygon vertices and problems on a chunk of facets.
 
@@ -20,6 +19,8 @@ def count_chunk(chunk, owners, facets, sites, ws, problems):
             problems[n_problems, 0] = facet
             problems[n_problems, 1] = n
             n_problems += 1
+            if n == START_TOO_FAR:
+                owners[facet] = ws.candidate[ws.polygon_slot[0]]
             continue
         owners[facet] = ws.candidate[ws.polygon_slot[0]]
         polygons += n
@@ -27,7 +28,7 @@ def count_chunk(chunk, owners, facets, sites, ws, problems):
     return polygons, vertices, n_problems
 
 
-@njit(cache=True, nogil=True)
+@kernel
 def write_chunk(chunk, owners, facets, sites, ws, facet_of, site_of, size, label, vertex):
     """Write the polygons of a chunk of facets: per polygon facet, site, vertex count; per vertex the rest.
 

@@ -14,14 +14,14 @@ embedding enters once per polygon.
 """
 
 import numpy as np
-from numba import njit
 
-from .clip import BUFFER_TOO_SMALL, clip_facet
+from .clip import BUFFER_TOO_SMALL, START_TOO_FAR, clip_facet
+from .compiled import inlined, kernel
 
 
-@njit(cache=True, nogil=True, forceinline=True)
-def _moments(vertex, start, end, first):
-    """Write area fraction, M1 (3) and M2 (ab, bc, ca by opposite corner: bc, ca, ab) of a polygon."""
+@inlined
+def _moments(vertex, start, end):
+    """Return the area fraction, M1 (a, b, c) and M2 (bc, ca, ab) of a polygon."""
     area = 0.0
     ma = mb = mc = 0.0
     mbc = mca = mab = 0.0
@@ -38,16 +38,10 @@ def _moments(vertex, start, end, first):
         mbc += t * (pb * pc + qb * qc + rb * rc + sb * sc)
         mca += t * (pc * pa + qc * qa + rc * ra + sc * sa)
         mab += t * (pa * pb + qa * qb + ra * rb + sa * sb)
-    first[0] = area
-    first[1] = ma / 3.0
-    first[2] = mb / 3.0
-    first[3] = mc / 3.0
-    first[4] = mbc / 12.0
-    first[5] = mca / 12.0
-    first[6] = mab / 12.0
+    return area, ma / 3.0, mb / 3.0, mc / 3.0, mbc / 12.0, mca / 12.0, mab / 12.0
 
 
-@njit(cache=True, nogil=True, forceinline=True)
+@inlined
 def _height(facets, facet, positions, site):
     """Return h = N . (v_a - x) of a site over a facet."""
     corner = facets.faces[facet, 0]
@@ -57,7 +51,7 @@ def _height(facets, facet, positions, site):
     return h
 
 
-@njit(cache=True, nogil=True, forceinline=True)
+@inlined
 def _boundary_motion(ws, k, following, i, j, jump, side2, area):
     """Return the coefficient of (m - x_i) for the bisector edge k to following between slots i and j."""
     da = ws.vertex[following, 0] - ws.vertex[k, 0]
@@ -73,7 +67,7 @@ def _boundary_motion(ws, k, following, i, j, jump, side2, area):
     return jump * 4.0 * area * np.sqrt(length2 / slope2)
 
 
-@njit(cache=True, nogil=True)
+@kernel
 def integrate_chunk(chunk, owners, facets, sites, ws, sharpness, row_of, touched, accumulated, problems):
     """Integrate over a chunk of facets, given by index.
 
@@ -85,8 +79,6 @@ def integrate_chunk(chunk, owners, facets, sites, ws, sharpness, row_of, touched
     dimension = sites.positions.shape[1]
     extra = sharpness * sharpness - 1.0
     n_touched = 0
-    moments = np.empty(7)
-    corner_weight = np.empty(3)
     n_problems = 0
     for facet in chunk:
         n_polygons = clip_facet(facet, owners[facet], facets, sites, ws)
@@ -94,6 +86,8 @@ def integrate_chunk(chunk, owners, facets, sites, ws, sharpness, row_of, touched
             problems[n_problems, 0] = facet
             problems[n_problems, 1] = n_polygons if n_polygons < 0 else BUFFER_TOO_SMALL
             n_problems += 1
+            if n_polygons == START_TOO_FAR:
+                owners[facet] = ws.candidate[ws.polygon_slot[0]]
             continue
         owners[facet] = ws.candidate[ws.polygon_slot[0]]
         area = facets.area[facet]
@@ -111,19 +105,14 @@ def integrate_chunk(chunk, owners, facets, sites, ws, sharpness, row_of, touched
                 for k in range(dimension + 2):
                     accumulated[row, k] = 0.0
                 n_touched += 1
-            _moments(ws.vertex, start, stop, moments)
-            mass = area * moments[0]
+            share, ma, mb, mc, mbc, mca, mab = _moments(ws.vertex, start, stop)
+            mass = area * share
             energy = area * (
-                ws.table[i, 0] * moments[1]
-                + ws.table[i, 1] * moments[2]
-                + ws.table[i, 2] * moments[3]
-                - side2[0] * moments[4]
-                - side2[1] * moments[5]
-                - side2[2] * moments[6]
+                (ws.table[i, 0] * ma + ws.table[i, 1] * mb + ws.table[i, 2] * mc)
+                - (side2[0] * mbc + side2[1] * mca + side2[2] * mab)
             )
             own_weight = 2.0 * mass
-            for c in range(3):
-                corner_weight[c] = -2.0 * area * moments[1 + c]
+            weight_a, weight_b, weight_c = -2.0 * area * ma, -2.0 * area * mb, -2.0 * area * mc
             if extra > 0.0:
                 h = _height(facets, facet, sites.positions, site)
                 energy += extra * mass * h * h
@@ -137,17 +126,18 @@ def integrate_chunk(chunk, owners, facets, sites, ws, sharpness, row_of, touched
                     following = k + 1 if k + 1 < stop else start
                     weight = _boundary_motion(ws, k, following, i, j, extra * (h * h - h_j * h_j), side2, area)
                     own_weight -= weight
-                    for c in range(3):
-                        corner_weight[c] += 0.5 * weight * (ws.vertex[k, c] + ws.vertex[following, c])
+                    weight_a += 0.5 * weight * (ws.vertex[k, 0] + ws.vertex[following, 0])
+                    weight_b += 0.5 * weight * (ws.vertex[k, 1] + ws.vertex[following, 1])
+                    weight_c += 0.5 * weight * (ws.vertex[k, 2] + ws.vertex[following, 2])
             a = facets.faces[facet, 0]
             b = facets.faces[facet, 1]
             c = facets.faces[facet, 2]
             for k in range(dimension):
                 accumulated[row, k] += (
                     own_weight * sites.positions[site, k]
-                    + corner_weight[0] * facets.points[a, k]
-                    + corner_weight[1] * facets.points[b, k]
-                    + corner_weight[2] * facets.points[c, k]
+                    + weight_a * facets.points[a, k]
+                    + weight_b * facets.points[b, k]
+                    + weight_c * facets.points[c, k]
                 )
             accumulated[row, dimension] += mass
             accumulated[row, dimension + 1] += energy
@@ -156,7 +146,7 @@ def integrate_chunk(chunk, owners, facets, sites, ws, sharpness, row_of, touched
     return n_touched, n_problems
 
 
-@njit(cache=True, nogil=True)
+@kernel
 def gather(touched, accumulated, gradient, mass, energy):
     """Add the rows of one chunk to the gradient (S, d), the mass (S,) and the energy (S,) of each cell."""
     dimension = gradient.shape[1]

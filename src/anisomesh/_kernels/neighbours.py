@@ -1,10 +1,11 @@
-"""Keeping neighbour lists sorted while the sites move (lists after Verlet 1967)."""
+"""Keeping neighbour lists almost sorted while the sites move (lists after Verlet 1967)."""
 
 import numpy as np
-from numba import njit
+
+from .compiled import inlined, kernel
 
 
-@njit(cache=True, nogil=True)
+@kernel
 def displacements(positions, reference, moved):
     """Write how far each site has moved from its reference; return the largest of these lengths."""
     farthest = 0.0
@@ -18,32 +19,55 @@ def displacements(positions, reference, moved):
     return farthest
 
 
-@njit(cache=True, nogil=True)
-def refresh_lists(which, positions, start, count, neighbours, distance2):
-    """Recompute the squared distances of the lists of these sites and sort each list by them.
+@inlined
+def _refresh(site, positions, start, count, neighbours, distance):
+    """Recompute the distances of a list and sort it by them.
 
-    Insertion sort: the lists are almost sorted from the last time. Ties keep the order of the site index, so
+    Insertion sort: the list is almost sorted from the last time. Ties keep the order of the site index, so
     the result does not depend on the history.
     """
-    dimension = positions.shape[1]
+    first = start[site]
+    for k in range(first, first + count[site]):
+        other = neighbours[k]
+        d2 = 0.0
+        for c in range(positions.shape[1]):
+            t = positions[site, c] - positions[other, c]
+            d2 += t * t
+        d = np.sqrt(d2)
+        m = k
+        while m > first and (distance[m - 1] > d or (distance[m - 1] == d and neighbours[m - 1] > other)):
+            distance[m] = distance[m - 1]
+            neighbours[m] = neighbours[m - 1]
+            m -= 1
+        distance[m] = d
+        neighbours[m] = other
+
+
+@kernel
+def refresh_lists(which, positions, start, count, neighbours, distance, worn):
+    """Recompute and sort the lists of these sites."""
     for site in which:
-        first = start[site]
-        for k in range(first, first + count[site]):
-            other = neighbours[k]
-            d2 = 0.0
-            for c in range(dimension):
-                t = positions[site, c] - positions[other, c]
-                d2 += t * t
-            m = k
-            while m > first and (distance2[m - 1] > d2 or (distance2[m - 1] == d2 and neighbours[m - 1] > other)):
-                distance2[m] = distance2[m - 1]
-                neighbours[m] = neighbours[m - 1]
-                m -= 1
-            distance2[m] = d2
-            neighbours[m] = other
+        _refresh(site, positions, start, count, neighbours, distance)
+        worn[site] = 0.0
 
 
-@njit(cache=True, nogil=True)
+@kernel
+def wear_lists(which, steps, limit, positions, start, count, neighbours, distance, worn):
+    """Add to ``worn`` by how much a step, of the length given for every site, may have changed the distances in a list.
+
+    Lists for which it has become more than the limit are recomputed.
+    """
+    for site in which:
+        farthest = 0.0
+        for k in range(start[site], start[site] + count[site]):
+            farthest = max(farthest, steps[neighbours[k]])
+        worn[site] += steps[site] + farthest
+        if worn[site] > limit[site]:
+            _refresh(site, positions, start, count, neighbours, distance)
+            worn[site] = 0.0
+
+
+@kernel
 def limit_radius(start, count, neighbours, distance, index, radius):
     """Lower the radius of each site to the distance of the nearest probe that its list does not hold.
 
@@ -65,3 +89,25 @@ def limit_radius(start, count, neighbours, distance, index, radius):
             if not held or p == index.shape[1] - 1:
                 radius[site] = distance[site, p]
                 break
+
+
+@kernel
+def walk(queries, owner, positions, start, count, neighbours):
+    """Move the owner of each query (n, d) to a neighbour that is nearer, until none is; ties go to the larger index."""
+    dimension = positions.shape[1]
+    for q in range(len(queries)):
+        nearest = owner[q]
+        least = np.inf
+        before = np.int64(-1)
+        while before != nearest:
+            before = nearest
+            for k in range(start[before] - 1, start[before] + count[before]):
+                other = neighbours[k] if k >= start[before] else before
+                d2 = 0.0
+                for c in range(dimension):
+                    t = queries[q, c] - positions[other, c]
+                    d2 += t * t
+                if d2 < least or (d2 == least and other > nearest):
+                    least = d2
+                    nearest = other
+        owner[q] = nearest

@@ -14,13 +14,14 @@ site, hence the same on every facet: the diagram is consistent over the whole su
 """
 
 import numpy as np
-from numba import njit
+
+from .compiled import allocating, inlined
 
 _SPLITTER = 134217729.0  # 2**27 + 1
 _MAX_TERMS = 128
 
 
-@njit(cache=True, nogil=True, inline="always")
+@inlined
 def _two_product(a, b):
     """Return p, e with p + e = a * b exactly."""
     p = a * b
@@ -33,7 +34,7 @@ def _two_product(a, b):
     return p, a_low * b_low - (((p - a_high * b_high) - a_low * b_high) - a_high * b_low)
 
 
-@njit(cache=True, nogil=True)
+@allocating
 def sign_of_sum(terms, n):
     """Return the exact sign (-1, 0, 1) of the sum of the first n entries of an array of doubles."""
     expansion = np.empty(_MAX_TERMS + 1)
@@ -59,7 +60,7 @@ def sign_of_sum(terms, n):
     return 1 if expansion[length - 1] > 0.0 else -1
 
 
-@njit(cache=True, nogil=True)
+@allocating
 def _add_product(terms, n, a, b, sign):
     p, e = _two_product(a, b)
     terms[n] = sign * p
@@ -67,14 +68,14 @@ def _add_product(terms, n, a, b, sign):
     return n + 2
 
 
-@njit(cache=True, nogil=True)
+@allocating
 def _add_triple(terms, n, a, b, c, sign):
     p, e = _two_product(a, b)
     n = _add_product(terms, n, p, c, sign)
     return _add_product(terms, n, e, c, sign)
 
 
-@njit(cache=True, nogil=True)
+@allocating
 def _add_determinant(terms, n, p, q, r, sign):
     n = _add_triple(terms, n, p[0], q[1], r[2], sign)
     n = _add_triple(terms, n, p[0], q[2], r[1], -sign)
@@ -84,7 +85,7 @@ def _add_determinant(terms, n, p, q, r, sign):
     return _add_triple(terms, n, p[2], q[1], r[0], -sign)
 
 
-@njit(cache=True, nogil=True)
+@allocating
 def _add_cross_sum(terms, n, p, q):
     """Append the terms of (1, 1, 1) . (p x q)."""
     for k in range(3):
@@ -94,7 +95,7 @@ def _add_cross_sum(terms, n, p, q):
     return n
 
 
-@njit(cache=True, nogil=True)
+@allocating
 def cross_sum_sign(p, q, r):
     """Return the exact sign of (1, 1, 1) . ((p - r) x (q - r))."""
     terms = np.empty(_MAX_TERMS)
@@ -104,7 +105,7 @@ def cross_sum_sign(p, q, r):
     return sign_of_sum(terms, n)
 
 
-@njit(cache=True, nogil=True)
+@allocating
 def _slope_sign(p, q, a, b):
     """Return the exact sign of (p[b] - p[a]) - (q[b] - q[a])."""
     terms = np.empty(4)
@@ -115,7 +116,7 @@ def _slope_sign(p, q, a, b):
     return sign_of_sum(terms, 4)
 
 
-@njit(cache=True, nogil=True)
+@allocating
 def corner_side(w_i, w_j, index_i, index_j, corner):
     """Return 1 if site i owns this corner against site j, else -1."""
     if w_i[corner] != w_j[corner]:
@@ -123,7 +124,7 @@ def corner_side(w_i, w_j, index_i, index_j, corner):
     return 1 if index_i > index_j else -1
 
 
-@njit(cache=True, nogil=True)
+@allocating
 def edge_side(w_i, w_k, w_j, index_i, index_k, index_j, a, b):
     """Return 1 if i owns, against j, the point where the bisector of i and k meets side (a, b), else -1.
 
@@ -145,7 +146,7 @@ def edge_side(w_i, w_k, w_j, index_i, index_k, index_j, a, b):
     return sign * slope_k
 
 
-@njit(cache=True, nogil=True)
+@allocating
 def interior_side(w_i, w_k, w_l, w_j, index_i, index_k, index_l, index_j):
     """Return 1 if i owns, against j, the point common to the cells of i, k and l, else -1."""
     terms = np.empty(_MAX_TERMS)
@@ -169,7 +170,7 @@ def interior_side(w_i, w_k, w_l, w_j, index_i, index_k, index_l, index_j):
     return sign * orientation
 
 
-@njit(cache=True, nogil=True)
+@allocating
 def _first_by_index(i, sign_i, j, sign_j, k, sign_k, m, sign_m):
     """Return the first non-zero sign in the order of the indices; index -1 stands for "not there"."""
     last = -1

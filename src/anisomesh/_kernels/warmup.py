@@ -12,8 +12,10 @@ _ENTRY_POINTS = (
     diagram.count_chunk,
     diagram.write_chunk,
     neighbours.refresh_lists,
+    neighbours.wear_lists,
     neighbours.displacements,
     neighbours.limit_radius,
+    neighbours.walk,
 )
 
 

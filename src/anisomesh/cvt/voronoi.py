@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
 from typing import TypeVar
 
@@ -14,6 +13,7 @@ from anisomesh._arrays import EmbeddedPoints, Faces, Sites, SiteScalars
 from anisomesh._kernels import clip, diagram, integrate
 from anisomesh.cvt.diagram import Diagram, DiagramPart, assemble
 from anisomesh.cvt.neighbours import NeighbourLists
+from anisomesh.cvt.workers import Workers
 from anisomesh.errors import OptionError
 from anisomesh.surface import geometry
 
@@ -72,9 +72,9 @@ class RestrictedVoronoi:
         self.order = _spatial_order(self.points[faces[:, :3], :3].mean(axis=1))
         self.faces = np.ascontiguousarray(faces[self.order], dtype=np.int32)
         self.facets = facet_table(self.points, self.faces)
-        self.threads = threads
+        self._workers = Workers(threads)
         self._chunk = int(np.clip(-(-len(faces) // _MIN_CHUNKS), _MIN_CHUNK, _MAX_CHUNK))
-        self._lists = NeighbourLists()
+        self._lists = NeighbourLists(self._workers)
         self._owners = np.zeros(0, dtype=np.int32)
         self._buffers: list[_Buffers] = []
         self._size = 64
@@ -124,29 +124,33 @@ class RestrictedVoronoi:
             diagram.write_chunk(good, self._owners, self.facets, self._table, buffers.workspace, *part)
             return part, problems
 
-        sites = self._prepare(sites)
+        sites = self._prepare(sites, exact=True)
         return assemble(self.points, self.faces, np.array(sites), self._run(write_chunk, sites))
 
-    def _prepare(self, sites: Sites) -> Sites:
+    def _prepare(self, sites: Sites, *, exact: bool = False) -> Sites:
         # kernels are compiled anew for other types, orders and read-only arrays
         sites = np.require(sites, np.float64, ["C", "W"])
         if sites.ndim != 2 or sites.shape[1] != self.points.shape[1] or len(sites) == 0:
             raise OptionError(f"sites has shape {sites.shape}; expected (S, {self.points.shape[1]}) with S >= 1")
         new = len(sites) != self._lists.n_sites
-        self._table = self._lists.table(sites, self.threads)
+        self._table = self._lists.table(sites, exact=exact)
         if new:
-            self._owners = self._lists.nearest(self.points[self.faces[:, 0]], sites, self.threads)
+            self._owners = self._lists.nearest(self.points[self.faces[:, 0]], sites)
             self._buffers = []
-        while len(self._buffers) < self.threads:
-            self._buffers.append(_Buffers(len(sites), sites.shape[1], self._size, self._chunk))
+        while len(self._buffers) < self._workers.threads:
+            self._buffers.append(self._new_buffers(sites))
         return sites
+
+    def _new_buffers(self, sites: Sites) -> _Buffers:
+        return _Buffers(len(sites), sites.shape[1], self._size, self._chunk)
 
     def _run(self, work: Callable[[Chunk, _Buffers], tuple[_T, Problems]], sites: Sites) -> list[_T]:
         """Run the work on all facets by chunks, again on those with problems once the cause is mended."""
         facets = np.arange(len(self.faces), dtype=np.int32)
         parts: list[_T] = []
         for _ in range(_MAX_ROUNDS):
-            results = self._run_once(work, np.split(facets, np.arange(self._chunk, len(facets), self._chunk)))
+            chunks = np.split(facets, np.arange(self._chunk, len(facets), self._chunk))
+            results = self._workers.map(lambda thread, chunk: work(chunk, self._buffers[thread]), chunks)
             parts.extend(part for part, _ in results)
             problems = np.concatenate([problems for _, problems in results])
             if len(problems) == 0:
@@ -155,37 +159,28 @@ class RestrictedVoronoi:
             facets = problems[:, 0]
         raise RuntimeError(f"{len(problems)} facets could not be clipped, the first: {problems[0].tolist()}")
 
-    def _run_once(
-        self, work: Callable[[Chunk, _Buffers], tuple[_T, Problems]], chunks: list[Chunk]
-    ) -> list[tuple[_T, Problems]]:
-        threads = min(self.threads, len(chunks))
-        if threads == 1:
-            return [work(chunk, self._buffers[0]) for chunk in chunks]
-
-        def strand(thread: int) -> list[tuple[_T, Problems]]:
-            return [work(chunk, self._buffers[thread]) for chunk in chunks[thread::threads]]
-
-        with ThreadPoolExecutor(threads - 1) as pool:
-            others = [pool.submit(strand, thread) for thread in range(1, threads)]
-            strands = [strand(0), *(other.result() for other in others)]
-        return [strands[k % threads][k // threads] for k in range(len(chunks))]
-
     def _mend(self, problems: Problems, sites: Sites) -> None:
         """Give workspaces more room, facets the nearest owner, lists more neighbours."""
         facet, status = problems.T
         needed = np.max([buffers.workspace.needed for buffers in self._buffers], axis=0)
         if (status == clip.BUFFER_TOO_SMALL).any():
             self._size *= 2
-            self._buffers = [_Buffers(len(sites), sites.shape[1], self._size, self._chunk) for _ in range(self.threads)]
+            self._buffers = [self._new_buffers(sites) for _ in self._buffers]
         for buffers in self._buffers:
             buffers.workspace.needed[:] = 0.0
-        astray = facet[(status == clip.NO_OWNER) | (status == clip.START_TOO_FAR)]
-        if len(astray):
-            old = self._owners[astray]
-            self._owners[astray] = self._lists.nearest(self.points[self.faces[astray, 0]], sites, self.threads)
-            needed[old[self._owners[astray] != old]] = 0.0
+        far, none = facet[status == clip.START_TOO_FAR], facet[status == clip.NO_OWNER]
+        if len(far):
+            old, corner = self._owners[far], self.points[self.faces[far, 0]]
+            new = self._lists.near(corner, sites)
+            distance, old_distance = ((sites[[new, old]] - corner) ** 2).sum(axis=2)
+            # of sites at the same place the one of larger index owns all
+            better = (distance < old_distance) | ((distance == old_distance) & (new > old))
+            self._owners[far[better]] = new[better]
+            needed[old[better]] = 0.0
+        if len(none):
+            self._owners[none] = self._lists.nearest(self.points[self.faces[none, 0]], sites)
         if needed.any():
-            self._table = self._lists.grow(sites, needed, self.threads)
+            self._table = self._lists.grow(sites, needed)
 
 
 class _Buffers:

@@ -52,7 +52,9 @@ def exchange_sites(voronoi: RestrictedVoronoi, sites: Sites, surface: Surface, s
     new = new[squared[new] > _WORTH * squared.mean()]
     energy = voronoi.evaluate(sites, sharpness).cell_energy
     old = _spaced(sites, np.argsort(energy, kind="stable"), len(new), 2.0 * spacing)
-    return np.concatenate([np.delete(sites, old, axis=0), voronoi.points[new[: len(old)]]])
+    result = np.array(sites)
+    result[old] = voronoi.points[new[: len(old)]]
+    return result
 
 
 def _spaced(
