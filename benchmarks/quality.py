@@ -20,6 +20,7 @@ import anisomesh
 from anisomesh.evaluation.distance import surface_distance
 from anisomesh.evaluation.quality import anisotropic_quality, transfer_metric_roots
 from anisomesh.metric.tensor import compute_metric, metric_root
+from anisomesh.surface.closest import ClosestPoints
 from anisomesh.surface.geometry import unit_frame
 from anisomesh.surface.mesh import Surface
 from anisomesh.surface.topology import connected_components
@@ -44,7 +45,7 @@ def measure(path: Path, ratio: float, sharpness: float) -> dict[str, Any]:
     surface = Surface(frame.to_unit(result.surface.points), result.surface.faces)
     roots = metric_root(compute_metric(reference).tensors)
     quality = anisotropic_quality(
-        surface.points, surface.faces, transfer_metric_roots(reference, roots, surface.points)
+        surface.points, surface.faces, transfer_metric_roots(ClosestPoints(reference), roots, surface.points)
     )
     distance = surface_distance(reference, surface)
     n_components = connected_components(reference.faces, reference.n_points)[0]

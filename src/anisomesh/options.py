@@ -49,7 +49,7 @@ class RemeshOptions:
     seed: int = 0
     threads: int = 2
     lloyd_iterations: int = 9
-    max_iterations: int = 100
+    max_iterations: int = 150
     weld_tolerance: float = 0.0
     crease_angle: float = 45.0
 

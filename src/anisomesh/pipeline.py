@@ -108,7 +108,9 @@ def remesh(
         optimised = optimise(voronoi, n, ordered, embedding.scale, options, run.on_step)
     with run.stage("dual"):
         angle = options.crease_angle if options.sharpness > 1.0 else 180.0
-        refined = refine(voronoi, optimised.sites, ordered, embedding.scale, n_vertices=n, crease_angle=angle)
+        refined = refine(
+            voronoi, optimised.sites, ordered, embedding.scale, n_vertices=n, crease_angle=angle, tensors=metric.tensors
+        )
         surface = Surface(frame.to_model(refined.points), refined.faces)
         validity = check_validity(surface, prepared.surface)
     return RemeshResult(

@@ -9,6 +9,7 @@ from anisomesh.cvt.optimise import lloyd
 from anisomesh.cvt.voronoi import RestrictedVoronoi
 from anisomesh.dual.cells import cells_of
 from anisomesh.dual.refine import refine
+from anisomesh.metric.tensor import uniform_metric
 from anisomesh.surface import shapes, topology
 from anisomesh.surface.mesh import Surface
 
@@ -31,7 +32,15 @@ def case(shape, n=None):
 
 
 def mended(voronoi, sites, surface, scale=1.0, crease_angle=180.0):
-    return refine(voronoi, sites, surface, scale, n_vertices=len(sites), crease_angle=crease_angle)
+    return refine(
+        voronoi,
+        sites,
+        surface,
+        scale,
+        n_vertices=len(sites),
+        crease_angle=crease_angle,
+        tensors=uniform_metric(surface),
+    )
 
 
 @pytest.mark.parametrize("crease_angle", [30.0, 180.0])

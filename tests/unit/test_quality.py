@@ -9,6 +9,7 @@ from scipy.spatial.transform import Rotation
 from anisomesh.errors import MetricError
 from anisomesh.evaluation.quality import anisotropic_quality, transfer_metric_roots
 from anisomesh.metric.tensor import metric_root
+from anisomesh.surface.closest import ClosestPoints
 from anisomesh.surface.mesh import Surface
 from anisomesh.surface.shapes import ellipsoid, sphere
 
@@ -83,7 +84,7 @@ def test_quality_is_heron_of_the_mapped_sides():
 def test_roots_at_the_points_themselves_are_unchanged():
     surface = ellipsoid((1.0, 0.6, 0.3), 2)
     roots = np.random.default_rng(0).standard_normal((surface.n_points, 3, 3))
-    np.testing.assert_allclose(transfer_metric_roots(surface, roots, surface.points), roots, atol=1e-9)
+    np.testing.assert_allclose(transfer_metric_roots(ClosestPoints(surface), roots, surface.points), roots, atol=1e-9)
 
 
 def test_linear_field_is_interpolated_exactly_above_and_below_the_surface():
@@ -97,9 +98,11 @@ def test_linear_field_is_interpolated_exactly_above_and_below_the_surface():
         return base + (2 * points[:, 0] - 3 * points[:, 1])[:, None, None] * slope
 
     queries = np.random.default_rng(0).uniform([0, 0, -1], [3, 3, 1], (200, 3))
-    np.testing.assert_allclose(transfer_metric_roots(surface, field(grid), queries), field(queries), atol=1e-9)
+    np.testing.assert_allclose(
+        transfer_metric_roots(ClosestPoints(surface), field(grid), queries), field(queries), atol=1e-9
+    )
 
 
 def test_roots_of_wrong_shape_are_refused():
     with pytest.raises(MetricError, match=r"expected \(12, 3, 3\)"):
-        transfer_metric_roots(sphere(0), identity(11), np.zeros((1, 3)))
+        transfer_metric_roots(ClosestPoints(sphere(0)), identity(11), np.zeros((1, 3)))

@@ -124,9 +124,9 @@ def _keeps_normals(surface: Surface, gone: Ints, into: Ints) -> npt.NDArray[np.b
 
 
 def _faces_reference(surface: Surface, gone: Ints, into: Ints, reference: ClosestPoints) -> npt.NDArray[np.bool_]:
-    """Return which collapses (n,) leave no face that is turned away from the reference."""
+    """Return which collapses (n,) leave only faces that clearly face the way of the reference."""
     which, _, moved = _changed_faces(surface, gone, into)
-    return np.asarray(np.bincount(which, reference.turned(surface.points[moved]), minlength=len(gone)) == 0)
+    return np.asarray(np.bincount(which, ~reference.clearly_facing(surface.points[moved]), minlength=len(gone)) == 0)
 
 
 def _changed_faces(surface: Surface, gone: Ints, into: Ints) -> tuple[Ints, Ints, Ints]:

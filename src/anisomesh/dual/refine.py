@@ -7,15 +7,18 @@ from dataclasses import dataclass
 import numpy as np
 import numpy.typing as npt
 
-from anisomesh._arrays import EmbeddedPoints, Faces, Points, Sites
+from anisomesh._arrays import EmbeddedPoints, Faces, Points, PointTensors, Sites
 from anisomesh.cvt.diagram import Diagram
 from anisomesh.cvt.voronoi import RestrictedVoronoi
 from anisomesh.dual.cells import Cells, cells_of
 from anisomesh.dual.decimate import decimate
+from anisomesh.dual.flip import flip_for_shape
 from anisomesh.dual.place import crease_positions, creased_cells, sharp_edges, snap_to_missed
 from anisomesh.dual.simplicial import simplicial_mesh
 from anisomesh.dual.triangulate import dual_mesh
 from anisomesh.dual.untangle import untangle
+from anisomesh.evaluation.quality import transfer_metric_roots
+from anisomesh.metric.tensor import metric_root
 from anisomesh.surface.closest import ClosestPoints
 from anisomesh.surface.mesh import Surface
 
@@ -61,6 +64,7 @@ def refine(
     *,
     n_vertices: int,
     crease_angle: float,
+    tensors: PointTensors,
 ) -> Refined:
     """Return the dual of the diagram of these sites, made valid, with at most so many vertices where possible.
 
@@ -79,6 +83,8 @@ def refine(
     crease_angle
         Edges of the surface whose faces differ by more than this many degrees are creases, onto which the vertices of
         their cells are put.
+    tensors
+        The metric at the points of the surface (V, 3, 3).
 
     Notes
     -----
@@ -89,6 +95,7 @@ def refine(
        twice make it a simplicial mesh.
     3. What this inserted is taken away by edge collapses with the link condition, cheapest first.
     4. Triangles that face away from the surface are turned back by edge flips and moves.
+    5. Edges are flipped where that gives better triangles in the metric.
 
     Where step 1 does not succeed (a tube thinner than the distance between sites) the working surface itself, which
     is valid, is coarsened by the same collapses. The paper inserts sites for every defect and optimises again;
@@ -117,6 +124,8 @@ def refine(
     if len(space) > n_vertices:
         space, faces = decimate(space, faces, n_vertices, reference)
         space, faces, turned = untangle(space, faces, reference)
+    roots = transfer_metric_roots(reference, metric_root(tensors), space)
+    faces = flip_for_shape(space, faces, roots, reference)
     return Refined(
         points=space,
         faces=faces,

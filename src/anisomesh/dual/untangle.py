@@ -2,17 +2,22 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable, Iterator
+
 import numpy as np
 import numpy.typing as npt
 
 from anisomesh._arrays import Faces, Points
 from anisomesh.dual.decimate import collapsible_edges
+from anisomesh.dual.flip import do_flips, possible_flips
+from anisomesh.surface import geometry
 from anisomesh.surface.closest import ClosestPoints
 from anisomesh.surface.mesh import Surface
 
 MAX_ROUNDS = 60
 _SWEEPS = 10
 _LIFTS = (0.0, 0.1, 0.25, 0.5, 1.0)  # trial heights over an edge, in edge lengths
+_NUDGES = (0.02, 0.05, 0.1, 0.2, 0.4)  # trial steps of a point, in lengths of the edges there
 
 Ints = npt.NDArray[np.int64]
 
@@ -35,11 +40,11 @@ def untangle(points: Points, faces: Faces, reference: ClosestPoints) -> tuple[Po
     Notes
     -----
     In each round every turned triangle is given the flip of one of its edges, or else the move of one of its
-    points to the average of its neighbours (on the surface or not), or else the collapse of one of its edges, or
-    else a point on one of its edges, lifted to the side of the surface that the mesh is on there (on a thin sheet a
-    chord can come nearer to the other side), or else a few sweeps of smoothing around it. Taken is what leaves fewest
-    turned triangles among those it changes,
-    and only if their number falls, so the rounds end.
+    points to the average of its neighbours (on the surface or not) or by a small step, or else the collapse of one of
+    its edges, or else a point in it or on one of its edges, lifted to the side of the surface that the mesh is on
+    there (on a thin sheet a chord can come nearer to the other side), or else a few sweeps of smoothing around it.
+    Taken is what leaves fewest turned triangles among those it changes, and only if their number falls, so the rounds
+    end.
     """
     for _ in range(MAX_ROUNDS):
         surface = Surface(points, faces)
@@ -50,7 +55,9 @@ def untangle(points: Points, faces: Faces, reference: ClosestPoints) -> tuple[Po
         if flipped is not None:
             faces = flipped
             continue
-        moved = _move(surface, turned, reference)
+        moved = _move(surface, turned, reference, _averages)
+        if moved is None:
+            moved = _move(surface, turned, reference, _nudges)
         if moved is not None:
             points = moved
             continue
@@ -67,36 +74,35 @@ def untangle(points: Points, faces: Faces, reference: ClosestPoints) -> tuple[Po
 
 def _flip(surface: Surface, turned: npt.NDArray[np.bool_], reference: ClosestPoints) -> Faces | None:
     """Return the faces after edge flips that leave fewer turned triangles, None if there is none."""
-    bad = np.flatnonzero(turned)
-    face, corner = np.repeat(bad, 3), np.tile(np.arange(3), len(bad))
-    other = surface.face_neighbours[face, corner].astype(np.int64)
-    face, corner, other = face[other >= 0], corner[other >= 0], other[other >= 0]
-    a, x, y = (surface.faces[face, (corner + k) % 3] for k in range(3))
-    b = surface.faces[other].sum(axis=1) - x - y
-    known = {(int(u), int(v)) for u, v in surface.edges}
-    ends = np.sort(np.stack([a, b], axis=1), axis=1).tolist()
-    new = np.array([u != v and (u, v) not in known for u, v in ends], dtype=bool)
-    face, other, a, b, x, y = (values[new] for values in (face, other, a, b, x, y))
-    pairs = np.stack([np.stack([a, x, b], axis=1), np.stack([a, b, y], axis=1)], axis=1)
-    corners = surface.points[pairs].reshape(-1, 3, 3)
-    after = reference.turned(corners).reshape(-1, 2).sum(axis=1)
-    before = turned[face].astype(int) + turned[other]
+    flips = possible_flips(surface, np.unique(surface.face_edges[turned]))
+    corners = surface.points[flips.triangles].reshape(-1, 3, 3)
+    change = reference.turned(corners).reshape(-1, 2).sum(axis=1) - turned[flips.pair].sum(axis=1)
     shape = _shape(corners).reshape(-1, 2).min(axis=1)
-    order = np.lexsort((-shape, after - before))
-    faces = surface.faces.copy()
-    used: set[int] = set()
-    for k in order[(after < before)[order]].tolist():
-        region = {int(face[k]), int(other[k]), *surface.face_neighbours[[face[k], other[k]]].ravel().tolist()}
-        edge = (min(int(a[k]), int(b[k])), max(int(a[k]), int(b[k])))
-        if not used & region and edge not in known:
-            used |= region
-            known.add(edge)
-            faces[face[k]], faces[other[k]] = pairs[k]
-    return faces if used else None
+    order = np.lexsort((-shape, change))
+    order = order[(change < 0)[order]]
+    return do_flips(surface.faces, flips, order) if len(order) else None
 
 
-def _move(surface: Surface, turned: npt.NDArray[np.bool_], reference: ClosestPoints) -> Points | None:
-    """Return the points after moves that leave fewer turned triangles, None if there is none."""
+def _averages(surface: Surface, point: int, ring: Ints, reference: ClosestPoints) -> Points:
+    """Return places (n, 3) for a point: the average of its neighbours, half way there, and that on the surface."""
+    average = surface.points[ring].mean(axis=0)
+    facet, weights = reference.locate(average[None])
+    on_surface = weights[0] @ reference.surface.points[reference.surface.faces[facet[0]]]
+    return np.stack([on_surface, average, 0.5 * (average + surface.points[point])])
+
+
+def _nudges(surface: Surface, point: int, ring: Ints, reference: ClosestPoints) -> Points:
+    """Return places (n, 3) around a point, the nearest first: towards each neighbour, and along the normal."""
+    to_ring = surface.points[ring] - surface.points[point]
+    normal = surface.point_normals[point] * np.linalg.norm(to_ring, axis=1).mean()
+    steps = np.concatenate([to_ring, [normal, -normal]])
+    return np.concatenate([surface.points[point] + share * steps for share in _NUDGES])
+
+
+def _move(
+    surface: Surface, turned: npt.NDArray[np.bool_], reference: ClosestPoints, places_of: Callable[..., Points]
+) -> Points | None:
+    """Return the points after moves to other places that leave fewer turned triangles, None if there is none."""
     points = surface.points.copy()
     faces_at: dict[int, list[int]] = {}
     candidates = np.unique(surface.faces[turned])
@@ -109,10 +115,7 @@ def _move(surface: Surface, turned: npt.NDArray[np.bool_], reference: ClosestPoi
         ring = np.setdiff1d(surface.faces[around], [point])
         if blocked & {point, *ring.tolist()}:
             continue
-        average = points[ring].mean(axis=0)
-        facet, weights = reference.locate(average[None])
-        on_surface = weights[0] @ reference.surface.points[reference.surface.faces[facet[0]]]
-        places = [on_surface, average, 0.5 * (average + points[point])]
+        places = places_of(surface, point, ring, reference)
         at_point = (surface.faces[around] == point)[:, :, None]
         trials = np.stack([np.where(at_point, place, points[surface.faces[around]]) for place in places])
         count = reference.turned(trials.reshape(-1, 3, 3)).reshape(len(places), -1).sum(axis=1)
@@ -141,29 +144,38 @@ def _collapse(surface: Surface, turned: npt.NDArray[np.bool_], reference: Closes
 
 
 def _split(surface: Surface, turned: npt.NDArray[np.bool_], reference: ClosestPoints) -> tuple[Points, Faces] | None:
-    """Return the mesh with one point more, on an edge, that leaves fewer turned triangles, None if there is none."""
+    """Return the mesh with a point more, in a face or on an edge, that leaves fewer turned triangles, or None."""
     best: tuple[int, Points, Faces] | None = None
+    m = surface.n_points
+    for gone, loop, start, lift in _stars(surface, turned):
+        facet, weights = reference.locate(start + np.outer(_LIFTS, lift))
+        places = np.einsum("nc,ncx->nx", weights, reference.surface.points[reference.surface.faces[facet]])
+        new = np.array([[u, v, m] for u, v in zip(loop, loop[1:] + loop[:1], strict=True)])
+        for place in places:
+            points = np.concatenate([surface.points, place[None]])
+            gain = int(turned[gone].sum() - reference.turned(points[new]).sum())
+            if gain > 0 and (best is None or gain > best[0]):
+                faces = np.concatenate([np.delete(surface.faces, gone, axis=0), new]).astype(np.int32)
+                best = gain, points, faces
+    return best[1:] if best is not None else None
+
+
+def _stars(
+    surface: Surface, turned: npt.NDArray[np.bool_]
+) -> Iterator[tuple[list[int], list[int], npt.NDArray[np.float64], npt.NDArray[np.float64]]]:
+    """Yield where a new point can go: faces it replaces, the loop around them, a place, and a way off the surface."""
+    points = surface.points
     for face in np.flatnonzero(turned).tolist():
+        loop = surface.faces[face].tolist()
+        yield [face], loop, points[loop].mean(axis=0), surface.face_normals[face] * np.sqrt(surface.face_areas[face])
         for corner in range(3):
             other = int(surface.face_neighbours[face, corner])
             if other < 0:
                 continue
-            a, x, y = (int(surface.faces[face, (corner + k) % 3]) for k in range(3))
+            a, x, y = (loop[(corner + k) % 3] for k in range(3))
             b = int(surface.faces[other].sum()) - x - y
-            middle = 0.5 * (surface.points[x] + surface.points[y])
-            out = surface.point_normals[x] + surface.point_normals[y]
-            reach = np.linalg.norm(surface.points[x] - surface.points[y]) / (np.linalg.norm(out) or 1.0)
-            facet, weights = reference.locate(middle + np.outer(_LIFTS, reach * out))
-            places = np.einsum("nc,ncx->nx", weights, reference.surface.points[reference.surface.faces[facet]])
-            m = surface.n_points
-            new = np.array([[a, x, m], [a, m, y], [b, y, m], [b, m, x]])
-            for place in places:
-                points = np.concatenate([surface.points, place[None]])
-                gain = int(turned[face]) + int(turned[other]) - int(reference.turned(points[new]).sum())
-                if gain > 0 and (best is None or gain > best[0]):
-                    faces = np.concatenate([np.delete(surface.faces, [face, other], axis=0), new]).astype(np.int32)
-                    best = gain, points, faces
-    return best[1:] if best is not None else None
+            out = geometry.unit(surface.point_normals[x] + surface.point_normals[y])
+            yield [face, other], [a, x, b, y], points[[x, y]].mean(axis=0), out * np.linalg.norm(points[x] - points[y])
 
 
 def _relax(surface: Surface, turned: npt.NDArray[np.bool_], reference: ClosestPoints) -> Points | None:

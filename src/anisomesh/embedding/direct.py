@@ -24,7 +24,7 @@ def embed(
     tensors: PointTensors,
     *,
     extra_dimensions: int = 5,
-    max_iterations: int = 5,
+    max_iterations: int = 10,
     tolerance: float = 1e-3,
 ) -> Embedding:
     """Embed a surface so that straight lengths in the embedding are lengths in the metric.

@@ -7,7 +7,6 @@ import numpy as np
 from anisomesh._arrays import Faces, FaceScalars, Points, PointTensors
 from anisomesh.errors import MetricError
 from anisomesh.surface.closest import ClosestPoints
-from anisomesh.surface.mesh import Surface
 
 
 def anisotropic_quality(points: Points, faces: Faces, roots: PointTensors) -> FaceScalars:
@@ -41,13 +40,13 @@ def anisotropic_quality(points: Points, faces: Faces, roots: PointTensors) -> Fa
     return np.asarray(np.divide(regular * area, denominator, out=np.zeros_like(area), where=denominator > 0.0))
 
 
-def transfer_metric_roots(reference: Surface, roots: PointTensors, query_points: Points) -> PointTensors:
+def transfer_metric_roots(reference: ClosestPoints, roots: PointTensors, query_points: Points) -> PointTensors:
     """Return the metric roots at points (n, 3) near a surface, (n, 3, 3).
 
     Parameters
     ----------
     reference
-        The surface on which the metric is given.
+        Search tree of the surface on which the metric is given.
     roots
         Symmetric square roots Q of the metric at its points (V, 3, 3).
     query_points
@@ -59,7 +58,8 @@ def transfer_metric_roots(reference: Surface, roots: PointTensors, query_points:
     MetricError
         If there is not one root per point of the surface.
     """
-    if roots.shape != (reference.n_points, 3, 3):
-        raise MetricError(f"roots has shape {roots.shape}; expected ({reference.n_points}, 3, 3)")
-    facet, weights = ClosestPoints(reference).locate(query_points)
-    return np.asarray(np.einsum("nc,ncij->nij", weights, roots[reference.faces[facet]]))
+    surface = reference.surface
+    if roots.shape != (surface.n_points, 3, 3):
+        raise MetricError(f"roots has shape {roots.shape}; expected ({surface.n_points}, 3, 3)")
+    facet, weights = reference.locate(query_points)
+    return np.asarray(np.einsum("nc,ncij->nij", weights, roots[surface.faces[facet]]))

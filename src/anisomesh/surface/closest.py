@@ -13,6 +13,8 @@ from anisomesh.surface.geometry import unit
 from anisomesh.surface.mesh import Surface
 
 _ON_SIDE = 1e-6
+_MARGIN = 0.01  # of the square root of twice the area of a triangle
+_CLEAR = 1e-3  # least cosine between normals that agree clearly
 
 Vectors = npt.NDArray[np.float64]
 Rows = npt.NDArray[np.int64]
@@ -66,7 +68,24 @@ class ClosestPoints:
         A triangle without area is not turned.
         """
         normals = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
-        return np.asarray(np.einsum("nx,nx->n", normals, self.normals(corners.mean(axis=1))) < 0.0)
+        return np.asarray(self._cosines(normals, corners.mean(axis=1)) < 0.0)
+
+    def clearly_facing(self, corners: Vectors) -> FaceMask:
+        """Return which triangles (n, 3, 3) are not turned by a margin.
+
+        Also where the surface is closest to points a little over and under the barycentre, the normals agree by more
+        than rounding. A triangle half way between the two sides of a thin part, or in a concave corner, is turned or
+        not by the rounding of distances alone; it does not face clearly.
+        """
+        normals = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
+        centre = corners.mean(axis=1)
+        lift = _MARGIN * unit(normals) * np.sqrt(np.linalg.norm(normals, axis=1, keepdims=True))
+        cosines = [self._cosines(normals, place) for place in (centre, centre + lift, centre - lift)]
+        return np.asarray(np.min(cosines, axis=0) > _CLEAR)
+
+    def _cosines(self, normals: Vectors, queries: Vectors) -> npt.NDArray[np.float64]:
+        """Return the cosine (n,) between normals of any length and those of the surface closest to the queries."""
+        return np.asarray(np.einsum("nx,nx->n", unit(normals), unit(self.normals(queries))))
 
     def _query(self, queries: Vectors) -> tuple[npt.NDArray[np.float64], Rows, Vectors]:
         queries = np.ascontiguousarray(queries, dtype=np.float64).reshape(-1, 3)

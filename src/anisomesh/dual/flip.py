@@ -1,0 +1,137 @@
+"""Edge flips: which ones there are, doing them, and those that give triangles a better shape in the metric."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+import numpy.typing as npt
+
+from anisomesh._arrays import Faces, Points, PointTensors
+from anisomesh.evaluation.quality import anisotropic_quality
+from anisomesh.surface import geometry
+from anisomesh.surface.closest import ClosestPoints
+from anisomesh.surface.mesh import Surface
+
+_MAX_ROUNDS = 20
+_MIN_GAIN = 1e-3  # of the sum of the qualities of the two triangles
+_MAX_TURN = 30.0  # degrees between the normals of the triangles before and after
+_SLACK = 0.01  # edge lengths by which the new edge may be farther from the surface than the old one
+
+Ints = npt.NDArray[np.int64]
+
+
+@dataclass(frozen=True, eq=False)
+class Flips:
+    """Edges with another diagonal of their two triangles that is no edge yet.
+
+    Attributes
+    ----------
+    pair
+        The two triangles at each edge (n, 2).
+    old, new
+        Ends of the edge and of the other diagonal (n, 2).
+    triangles
+        The triangles after the flip (n, 2, 3), oriented as before.
+    """
+
+    pair: Ints
+    old: Ints
+    new: Ints
+    triangles: Ints
+
+    def take(self, chosen: npt.NDArray[np.bool_]) -> Flips:
+        """Return some of the flips, by mask (n,)."""
+        return Flips(self.pair[chosen], self.old[chosen], self.new[chosen], self.triangles[chosen])
+
+
+def possible_flips(surface: Surface, edges: npt.NDArray[np.integer]) -> Flips:
+    """Return the flips of these edges (n,) that keep the mesh a manifold; edges with one triangle have none."""
+    edges = edges[surface.edge_face_count[edges] == 2]
+    faces = surface.faces.astype(np.int64)
+    pair = surface.edge_faces[edges].astype(np.int64)
+    corner = np.argmax(surface.face_edges[pair[:, 0]] == edges[:, None], axis=1)
+    a, x, y = (faces[pair[:, 0], (corner + k) % 3] for k in range(3))
+    b = faces[pair[:, 1]].sum(axis=1) - x - y
+    known = _edge_keys(surface.edges, surface.n_points)
+    free = (a != b) & ~np.isin(_edge_keys(np.stack([a, b], axis=1), surface.n_points), known)
+    triangles = np.stack([np.stack([a, x, b], axis=1), np.stack([a, b, y], axis=1)], axis=1)
+    return Flips(pair, np.stack([x, y], axis=1), np.stack([a, b], axis=1), triangles).take(free)
+
+
+def do_flips(faces: Faces, flips: Flips, order: Ints) -> Faces:
+    """Return the faces (F, 3) after the flips in this order, but those that an earlier one stands in the way of.
+
+    No triangle changes twice and no edge is made twice; so every flip has the effect that it has alone.
+    """
+    changed = faces.copy()
+    taken: set[int] = set()
+    made: set[tuple[int, int]] = set()
+    for k in order.tolist():
+        first, second = flips.pair[k].tolist()
+        low, high = sorted(flips.new[k].tolist())
+        if first not in taken and second not in taken and (low, high) not in made:
+            taken |= {first, second}
+            made.add((low, high))
+            changed[[first, second]] = flips.triangles[k]
+    return changed
+
+
+def flip_for_shape(points: Points, faces: Faces, roots: PointTensors, reference: ClosestPoints) -> Faces:
+    """Return the faces (F, 3) after flips of edges that give better triangles in the metric.
+
+    Parameters
+    ----------
+    points, faces
+        An oriented manifold mesh (V, 3), (F, 3).
+    roots
+        Symmetric square roots of the metric at the points (V, 3, 3).
+    reference
+        The surface that the mesh stands for.
+
+    Notes
+    -----
+    The dual of a Voronoi diagram has the best triangles for the metric that the embedding has, which is not quite the
+    one asked for. A flip is made if the qualities G of the two triangles have a larger sum after it, unless it makes a
+    fold or a triangle that faces away, or takes the middle of the edge farther from the surface, as a flip over a
+    crease does. The sum over the mesh grows with every flip, so the rounds end.
+    """
+    active = np.ones(len(faces), dtype=bool)
+    for _ in range(_MAX_ROUNDS):
+        surface = Surface(points, faces)
+        flips = possible_flips(surface, np.unique(surface.face_edges[active]))
+        before, after = (
+            anisotropic_quality(points, triangles.reshape(-1, 3), roots).reshape(-1, 2).sum(axis=1)
+            for triangles in (faces[flips.pair], flips.triangles)
+        )
+        gain = after - before
+        flips, gain = flips.take(gain > _MIN_GAIN), gain[gain > _MIN_GAIN]
+        allowed = _keeps_surface(surface, flips, reference)
+        flips, gain = flips.take(allowed), gain[allowed]
+        if len(gain) == 0:
+            break
+        changed = do_flips(faces, flips, np.argsort(-gain, kind="stable"))
+        active = (changed != faces).any(axis=1)
+        faces = changed
+    return faces
+
+
+def _keeps_surface(surface: Surface, flips: Flips, reference: ClosestPoints) -> npt.NDArray[np.bool_]:
+    """Return which flips (n,) keep the normals and do not take the mesh away from the reference."""
+    points = surface.points
+    normals = geometry.unit(geometry.face_cross(points, flips.triangles.reshape(-1, 3))).reshape(-1, 2, 3)
+    cosine = np.einsum("nix,njx->nij", normals, surface.face_normals[flips.pair])
+    allowed = np.asarray(cosine.min(axis=(1, 2)) > np.cos(np.radians(_MAX_TURN)))
+    some = flips.take(allowed)
+    old_distance, new_distance = (
+        np.sqrt(reference.squared_distances(points[ends].mean(axis=1))) for ends in (some.old, some.new)
+    )
+    length = np.linalg.norm(points[some.old[:, 1]] - points[some.old[:, 0]], axis=1)
+    facing = reference.clearly_facing(points[some.triangles.reshape(-1, 3)]).reshape(-1, 2).all(axis=1)
+    allowed[allowed] = (new_distance <= old_distance + _SLACK * length) & facing
+    return allowed
+
+
+def _edge_keys(ends: npt.NDArray[np.integer], n_points: int) -> Ints:
+    low, high = np.sort(ends, axis=1).astype(np.int64).T
+    return np.asarray(low * n_points + high)
