@@ -53,7 +53,8 @@ def check(prepared: Prepared, original: Surface) -> None:
     assert again.surface is surface
     assert not again.report.changed
     assert again.report.lines() == []
-    np.testing.assert_array_equal(surface.points, original.points[prepared.point_source])
+    extent = np.abs(original.points).max()
+    np.testing.assert_allclose(surface.points, original.points[prepared.point_source], rtol=0, atol=1e-13 * extent)
     assert prepared.report.changed == (surface is not original)
     assert prepared.report.components == topology.connected_components(surface.faces, surface.n_points)[0]
 
@@ -343,3 +344,8 @@ def test_broken_meshes_of_the_wild():
         assert topology.is_oriented(faces), path
         assert topology.count_nonmanifold_edges(faces) + topology.count_nonmanifold_points(faces) == 0, path
         assert prepare(prepared.surface).surface is prepared.surface, path
+
+
+def test_a_side_of_no_length_leaves_a_point_near_its_source():
+    points = np.array([[0, 0, 1], [0, 0, 0], [0, 1, 0], [0, 0, 1.2e-38]], dtype=float)
+    check(prepare(Surface(points, np.array([[0, 1, 3], [0, 2, 3]]))), Surface(points, np.array([[0, 1, 3], [0, 2, 3]])))

@@ -89,7 +89,8 @@ class Prepared:
     report
         What was done.
     point_source
-        An input point for every point (V,).
+        An input point for every point (V,), at the same place up to the weld tolerance and the rounding error below
+        which a side of a face has no length.
     """
 
     surface: Surface
