@@ -81,27 +81,40 @@ def fresh(code: str, **environment: str) -> str:
 
 
 MEMORY = """
-import resource, sys
+import sys
+from pathlib import Path
 sys.path.insert(0, {folder!r})
+import numpy as np
 from speed import ring
 from anisomesh import remesh
-import numpy as np
-surface = ring({n})
-remesh(ring(2000), ratio=0.5)
-peak = lambda: resource.getrusage(resource.RUSAGE_SELF).ru_maxrss * 1024
-before = peak()
-from anisomesh.cvt.voronoi import RestrictedVoronoi
 from anisomesh.cvt.optimise import lloyd, minimise
 from anisomesh.cvt.sampling import sample_surface
-from anisomesh.surface.geometry import unit
-points = np.concatenate([surface.points, 0.1 * surface.point_normals, np.zeros((surface.n_points, 2))], axis=1)
-voronoi = RestrictedVoronoi(points, surface.faces)
+from anisomesh.cvt.voronoi import RestrictedVoronoi
+from anisomesh.embedding.direct import embed
+from anisomesh.metric.tensor import compute_metric
+
+def status(name):
+    line = next(line for line in Path("/proc/self/status").read_text().splitlines() if line.startswith(name))
+    return 1024 * int(line.split()[1])
+
+def peak_above(work):
+    Path("/proc/self/clear_refs").write_text("5")  # the peak starts anew
+    before = status("VmRSS")
+    result = work()
+    return (status("VmHWM") - before) / {n}, result
+
+remesh(ring(2000), ratio=0.5)
+surface = ring({n})
+stages = []
+used, embedding = peak_above(lambda: embed(surface, compute_metric(surface).tensors))
+stages.append(("metric and embedding", used))
+voronoi = RestrictedVoronoi(embedding.points, surface.faces)
 sites = sample_surface(voronoi.points, voronoi.faces, voronoi.facets.area, {n}, np.random.default_rng(0))
-before = peak()
-sites = minimise(voronoi, lloyd(voronoi, sites, 4), sharpness=7.0, max_iterations=12).sites
-middle = peak()
-voronoi.diagram(sites)
-print((middle - before) / {n}, (peak() - before) / {n})
+used, sites = peak_above(lambda: minimise(voronoi, lloyd(voronoi, sites, 4), sharpness=7.0, max_iterations=12).sites)
+stages.append(("optimisation", used))
+used, _ = peak_above(lambda: voronoi.diagram(sites))
+stages.append(("diagram", used))
+print(", ".join(f"{{name}} {{used:.0f}}" for name, used in stages))
 """
 
 
@@ -128,7 +141,7 @@ def main() -> None:
     exponent = np.polyfit(np.log(options.sizes), np.log(times), 1)[0]
     print(f"evaluation time grows as n^{exponent:.2f}")
     folder = str(Path(__file__).parent.resolve())
-    print("bytes a site, optimisation and with diagram:", fresh(MEMORY.format(n=options.sizes[-1], folder=folder)))
+    print("peak bytes a site above what was there before:", fresh(MEMORY.format(n=options.sizes[-1], folder=folder)))
     code = "import time; t = time.perf_counter(); import anisomesh; print(time.perf_counter() - t)"
     print("import anisomesh:", fresh(code), "s")
     with tempfile.TemporaryDirectory() as cache:

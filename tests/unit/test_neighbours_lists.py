@@ -10,13 +10,13 @@ from anisomesh.cvt.workers import Workers
 
 
 def assert_lists_hold(table, sites):
-    """Every list is sorted, has true distances up to its wear, no duplicates, all sites within its complete radius."""
+    """Lists are sorted, have no duplicates, true distances up to a bound, and all sites within their complete radius."""
     distance = np.sqrt(((sites[:, None] - sites[None]) ** 2).sum(axis=2))
     for site in range(len(sites)):
         listed = table.neighbours[table.start[site] : table.start[site] + table.length[site]]
         promised = table.distance[table.start[site] : table.start[site] + table.length[site]]
         true = distance[site, listed]
-        assert np.all(np.abs(promised - true) <= table.worn[site] + 1e-12 * np.maximum(promised, true))
+        assert np.all(np.abs(promised - true) <= table.stale[site] + 1e-12 * np.maximum(promised, true))
         assert np.all(np.diff(promised) >= 0)
         assert len(set(listed.tolist())) == len(listed)
         assert site not in listed
@@ -56,8 +56,8 @@ def test_exact_lists_have_true_distances_whatever_came_before():
     for _ in range(4):
         assert_lists_hold(lists.table(sites), sites)
         sites = sites + 1e-4 * rng.normal(size=sites.shape)
-    assert lists.table(sites).worn.any()
-    assert not lists.table(sites, exact=True).worn.any()
+    assert lists.table(sites).stale.any()
+    assert not lists.table(sites, exact=True).stale.any()
     assert_lists_hold(lists.table(sites, exact=True), sites)
 
 

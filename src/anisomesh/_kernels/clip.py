@@ -47,7 +47,7 @@ class Sites(NamedTuple):
     length: np.ndarray  # (S,) number of its neighbours
     neighbours: np.ndarray  # (N,) int32
     distance: np.ndarray  # (N,) of a site to its neighbours, when the list was last sorted
-    worn: np.ndarray  # (S,) by how much the distances in a list may be too large
+    stale: np.ndarray  # (S,) by how much the distances in a list may be too large
     complete: np.ndarray  # (S,) radius within which the list of a site holds every other site
 
 
@@ -219,7 +219,7 @@ def clip_facet(facet, owner, facets, sites, ws):
     START_TOO_FAR the slot of the site in question as that of the first polygon. Lists that are too short are noted in
     the workspace, all those on the facet at once.
     """
-    positions, start, count, neighbours, distance, worn, complete = sites
+    positions, start, count, neighbours, distance, stale, complete = sites
     (
         clock,
         stamp,
@@ -265,12 +265,12 @@ def clip_facet(facet, owner, facets, sites, ws):
         spread = 2.0 * (max(wa, wb, wc) + slack + 3.0 * max(sa, sb, sc))
         _whole_facet(work, wa, wb, wc, slack)
         radius2 = max(wa, wb, wc) + slack
-        wear = worn[site]
+        lag = stale[site]
         n = 3
         source = 0
         rival = -1
         for k in range(start[site], start[site] + count[site]):
-            least = distance[k] - wear
+            least = distance[k] - lag
             if least > 0.0 and least * least > 4.0 * radius2 * (1.0 + _SLOP):
                 break
             other = neighbours[k]

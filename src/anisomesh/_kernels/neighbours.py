@@ -44,27 +44,27 @@ def _refresh(site, positions, start, count, neighbours, distance):
 
 
 @kernel
-def refresh_lists(which, positions, start, count, neighbours, distance, worn):
+def refresh_lists(which, positions, start, count, neighbours, distance, stale):
     """Recompute and sort the lists of these sites."""
     for site in which:
         _refresh(site, positions, start, count, neighbours, distance)
-        worn[site] = 0.0
+        stale[site] = 0.0
 
 
 @kernel
-def wear_lists(which, steps, limit, positions, start, count, neighbours, distance, worn):
-    """Add to ``worn`` by how much a step, of the length given for every site, may have changed the distances in a list.
+def age_lists(which, steps, limit, positions, start, count, neighbours, distance, stale):
+    """Add to ``stale`` by how much steps of these lengths (S,) may have changed the distances in each list.
 
-    Lists for which it has become more than the limit are recomputed.
+    Lists for which that has become more than the limit (S,) are recomputed.
     """
     for site in which:
         farthest = 0.0
         for k in range(start[site], start[site] + count[site]):
             farthest = max(farthest, steps[neighbours[k]])
-        worn[site] += steps[site] + farthest
-        if worn[site] > limit[site]:
+        stale[site] += steps[site] + farthest
+        if stale[site] > limit[site]:
             _refresh(site, positions, start, count, neighbours, distance)
-            worn[site] = 0.0
+            stale[site] = 0.0
 
 
 @kernel

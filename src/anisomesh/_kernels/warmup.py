@@ -12,7 +12,7 @@ _ENTRY_POINTS = (
     diagram.count_chunk,
     diagram.write_chunk,
     neighbours.refresh_lists,
-    neighbours.wear_lists,
+    neighbours.age_lists,
     neighbours.displacements,
     neighbours.limit_radius,
     neighbours.walk,

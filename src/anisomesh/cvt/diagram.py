@@ -53,32 +53,32 @@ class Diagram:
         return np.repeat(np.arange(len(self.site), dtype=np.int32), np.diff(self.offset))
 
     @cached_property
-    def previous(self) -> npt.NDArray[np.int64]:
+    def previous(self) -> Ints:
         """Vertex before each vertex in its polygon (Q,)."""
-        result = np.arange(-1, len(self.label) - 1)
+        result = np.arange(-1, len(self.label) - 1, dtype=np.int32)
         result[self.offset[:-1]] = self.offset[1:] - 1
         return result
 
     @cached_property
-    def following(self) -> npt.NDArray[np.int64]:
+    def following(self) -> Ints:
         """Vertex after each vertex in its polygon (Q,)."""
-        result = np.arange(1, len(self.label) + 1)
+        result = np.arange(1, len(self.label) + 1, dtype=np.int32)
         result[self.offset[1:] - 1] = self.offset[:-1]
         return result
 
     @cached_property
-    def twin(self) -> npt.NDArray[np.int64]:
+    def twin(self) -> Ints:
         """The same segment as an edge of the polygon behind each bisector edge (Q,), -1 for other edges."""
         edges = np.flatnonzero(self.label >= 0)
         polygon = self.polygon_of[edges]
         own, other = self.site[polygon].astype(np.int64), self.label[edges]
         key = self.facet[polygon].astype(np.int64) * len(self.sites) + np.minimum(own, other)
         edges = edges[np.argsort(key * len(self.sites) + np.maximum(own, other), kind="stable")]
-        result = np.full(len(self.label), -1, dtype=np.int64)
+        result = np.full(len(self.label), -1, dtype=np.int32)
         result[edges[0::2]], result[edges[1::2]] = edges[1::2], edges[0::2]
         return result
 
-    @cached_property
+    @property
     def positions(self) -> npt.NDArray[np.float64]:
         """Embedded positions of the vertices (Q, d)."""
         return self.at(self.facet[self.polygon_of], self.barycentric)
@@ -119,23 +119,16 @@ class DiagramPart(NamedTuple):
 
 
 def assemble(points: EmbeddedPoints, faces: Faces, sites: Sites, parts: list[DiagramPart]) -> Diagram:
-    """Return the diagram made of these parts, polygons in the order of facet and site."""
-    facet = np.concatenate([part.facet for part in parts])
-    site = np.concatenate([part.site for part in parts])
-    size = np.concatenate([part.size for part in parts])
-    label = np.concatenate([part.label for part in parts])
-    barycentric = np.concatenate([part.barycentric for part in parts])
+    """Return the diagram made of these parts, polygons in the order of facet and site; the list is emptied."""
+    facet, site, size = (np.concatenate([part[k] for part in parts]) for k in range(3))
     order = np.lexsort((site, facet))
-    start = np.cumsum(size) - size
     offset = np.concatenate([[0], np.cumsum(size[order])])
-    source = np.repeat(start[order] - offset[:-1], size[order]) + np.arange(len(label))
-    return Diagram(
-        points=points,
-        faces=faces,
-        sites=sites,
-        facet=facet[order],
-        site=site[order],
-        offset=offset,
-        label=label[source],
-        barycentric=barycentric[source],
-    )
+    start = np.empty(len(order), dtype=np.int64)  # of each polygon in the result
+    start[order] = offset[:-1]
+    label, barycentric = np.empty(offset[-1], dtype=np.int32), np.empty((offset[-1], 3))
+    while parts:  # one at a time, since they take as much room as the result
+        part = parts.pop()
+        start, here = start[: len(start) - len(part.size)], start[len(start) - len(part.size) :]
+        target = np.repeat(here - np.cumsum(part.size) + part.size, part.size) + np.arange(len(part.label))
+        label[target], barycentric[target] = part.label, part.barycentric
+    return Diagram(points, faces, sites, facet[order], site[order], offset, label, barycentric)

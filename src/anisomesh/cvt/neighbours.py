@@ -10,7 +10,7 @@ from scipy.spatial import cKDTree
 
 from anisomesh._arrays import Sites
 from anisomesh._kernels import clip
-from anisomesh._kernels.neighbours import displacements, limit_radius, refresh_lists, walk, wear_lists
+from anisomesh._kernels.neighbours import age_lists, displacements, limit_radius, refresh_lists, walk
 from anisomesh.cvt.blocks import Blocks
 from anisomesh.cvt.workers import Workers
 
@@ -19,10 +19,10 @@ _FAR = 0.45  # of the median list radius: when a site is this far from its ancho
 _NEAR = 0.1  # and these are the ones farther from their anchors than this
 _MOST = 0.05  # of all sites; if more are to be anchored anew, all lists are rebuilt
 _SPARE = 1.3  # a list that proves too short is made this much longer than needed
-_CROWDED = 3  # times the room that the lists in use take; then, too
+_CROWDED = 2  # times the room that the lists in use take; then, too
 _LONGEST_KEPT = 96  # a rebuild shortens longer lists to this
 _ENOUGH_FOR_THREADS = 2_000  # sites; fewer are done before another thread has begun
-_WEAR = 0.02  # of its radius, by which distances in a list may be out of date
+_STALE = 0.02  # of its radius, by which distances in a list may be out of date
 _PROBES = 4  # newly anchored sites that are looked for near every other site
 
 Floats = npt.NDArray[np.float64]
@@ -53,7 +53,7 @@ class NeighbourLists:
         self._radius: Floats
         self._filled: Floats  # the radius when the list was last sought
         self._distance: Floats
-        self._worn_distance: Floats  # by how much the distances in each list may have changed
+        self._stale: Floats  # by how much the distances in each list may have changed
         self._counts: npt.NDArray[np.int64]
         self._start: npt.NDArray[np.int64]
         self._neighbours: npt.NDArray[np.int32]
@@ -80,9 +80,9 @@ class NeighbourLists:
             else:
                 self._anchor(sites, movers)
             displacements(sites, self._anchors, self._moved)
-        self._wear(sites)
+        self._age(sites)
         if exact:
-            self._refresh(sites, np.flatnonzero(self._worn_distance))
+            self._refresh(sites, np.flatnonzero(self._stale))
         return self._as_table(sites)
 
     def grow(self, sites: Sites, needed: Floats) -> clip.Sites:
@@ -122,9 +122,7 @@ class NeighbourLists:
 
     def _as_table(self, sites: Sites) -> clip.Sites:
         complete = self._radius - self._worn()
-        return clip.Sites(
-            sites, self._start, self._counts, self._neighbours, self._distance, self._worn_distance, complete
-        )
+        return clip.Sites(sites, self._start, self._counts, self._neighbours, self._distance, self._stale, complete)
 
     def _worn(self) -> Floats:
         """Return by how much the radius within which each list is complete has shrunk since the anchors (S,)."""
@@ -152,7 +150,7 @@ class NeighbourLists:
         self._used = 0
         self._neighbours = np.zeros(2 * counts.sum(), dtype=np.int32)
         self._distance = np.zeros(2 * counts.sum())
-        self._worn_distance = np.full(self.n_sites, np.inf)
+        self._stale = np.full(self.n_sites, np.inf)
         for count in np.unique(counts).tolist():
             self._append(np.flatnonzero(counts == count), count)
         self._typical = float(np.median(self._radius))
@@ -168,7 +166,7 @@ class NeighbourLists:
         self._counts[group] = count
         self._neighbours[first : self._used] = self._search(group, count).ravel()
         self._distance[first : self._used] = 0.0
-        self._worn_distance[group] = np.inf
+        self._stale[group] = np.inf
 
     def _anchor(self, sites: Sites, movers: Rows) -> None:
         """Anchor these sites where they are now."""
@@ -189,7 +187,7 @@ class NeighbourLists:
             group = movers[self._counts[movers] == count]
             places = self._start[group][:, None] + np.arange(count)
             self._neighbours[places] = self._search(group, int(count))
-        self._worn_distance[movers] = np.inf
+        self._stale[movers] = np.inf
 
     def _search(self, group: Rows, count: int) -> npt.NDArray[np.int32]:
         """Return the ``count`` other sites with the nearest anchors (n, count) and set the radius they fill."""
@@ -204,17 +202,17 @@ class NeighbourLists:
         self._filled[group] = self._radius[group]
         return np.asarray(index[others].reshape(len(group), count), dtype=np.int32)
 
-    def _wear(self, sites: Sites) -> None:
-        """Let the lists wear by the step from the positions of the last call; renew those that are worn too much."""
+    def _age(self, sites: Sites) -> None:
+        """Let the distances age by the step from the positions of the last call; renew those that are too old."""
         steps = np.empty(self.n_sites)
         displacements(sites, self._sites, steps)
         self._sites = np.array(sites)
-        limit = np.where(np.isfinite(self._radius), _WEAR * self._radius, 0.0)
-        lists = (self._start, self._counts, self._neighbours, self._distance, self._worn_distance)
-        self._share(np.arange(self.n_sites), lambda part: wear_lists(part, steps, limit, sites, *lists))
+        limit = np.where(np.isfinite(self._radius), _STALE * self._radius, 0.0)
+        lists = (self._start, self._counts, self._neighbours, self._distance, self._stale)
+        self._share(np.arange(self.n_sites), lambda part: age_lists(part, steps, limit, sites, *lists))
 
     def _refresh(self, sites: Sites, which: Rows) -> None:
-        lists = (self._start, self._counts, self._neighbours, self._distance, self._worn_distance)
+        lists = (self._start, self._counts, self._neighbours, self._distance, self._stale)
         self._share(which, lambda part: refresh_lists(part, sites, *lists))
 
     def _share(self, which: Rows, work: Callable[[Rows], None]) -> None:

@@ -92,21 +92,19 @@ def _mass(
     diagram: Diagram, of_polygon: Ints, n: int, face_areas: npt.NDArray[np.float64]
 ) -> tuple[npt.NDArray[np.float64], npt.NDArray[np.float64]]:
     """Return area (C,) and centroid (C, d) of each component."""
-    here, there = diagram.barycentric, diagram.barycentric[diagram.following]
-    cross = here[:, 0] * there[:, 1] - here[:, 1] * there[:, 0]
+    here = diagram.barycentric.T
+    cross = here[0] * here[1][diagram.following] - here[1] * here[0][diagram.following]
     # triangles from barycentric corner c (0, 0, 1) to each edge: signed shares of area and of first moment
-    third = np.array([0.0, 0.0, 1.0])
-    moment: npt.NDArray[np.float64] = np.stack(
-        [
-            np.bincount(diagram.polygon_of, cross * (here[:, c] + there[:, c] + third[c]) / 3.0, len(diagram.site))
-            for c in range(3)
-        ],
-        axis=1,
-    )
+    moment = np.empty((len(diagram.site), 3))
+    for c, apex in enumerate((0.0, 0.0, 1.0)):
+        share = cross * (here[c] + here[c][diagram.following] + apex) / 3.0
+        moment[:, c] = np.bincount(diagram.polygon_of, share, minlength=len(diagram.site))
     weight = face_areas[diagram.facet]
     area = np.asarray(np.bincount(of_polygon, diagram.fractions * weight, minlength=n), dtype=np.float64)
-    moved = diagram.at(diagram.facet, moment) * weight[:, None]
-    total = np.stack([np.bincount(of_polygon, column, minlength=n) for column in moved.T], axis=1)
+    corners = diagram.faces[diagram.facet]
+    total = np.empty((n, diagram.points.shape[1]))
+    for k, coordinate in enumerate(diagram.points.T):
+        total[:, k] = np.bincount(of_polygon, weight * (moment * coordinate[corners]).sum(axis=1), minlength=n)
     centroid = diagram.sites[diagram.site[np.unique(of_polygon, return_index=True)[1]]].copy()
     np.divide(total, area[:, None], out=centroid, where=area[:, None] > 0.0)
     return area, centroid
@@ -114,15 +112,16 @@ def _mass(
 
 def _euler(diagram: Diagram, of_polygon: Ints, n: int, face_neighbours: FaceIndices) -> Ints:
     """Return the Euler characteristic of each component (C,), sharing what polygons have in common."""
-    facet = diagram.facet[diagram.polygon_of]
-    before, after = diagram.label[diagram.previous], diagram.label
-    shared_before = (before < 0) & (face_neighbours[facet, -1 - np.minimum(before, -1)] >= 0)
-    shared_after = (after < 0) & (face_neighbours[facet, -1 - np.minimum(after, -1)] >= 0)
+    side = np.flatnonzero(diagram.label < 0)
+    facet = diagram.facet[diagram.polygon_of[side]]
+    shared = np.zeros(len(diagram.label), dtype=bool)
+    shared[side] = face_neighbours[facet, -1 - diagram.label[side]] >= 0
+    before = diagram.label[diagram.previous[side]]
+    at_corner = before < 0
+    corner = diagram.faces[facet[at_corner], 5 + before[at_corner] + diagram.label[side[at_corner]]]
     valence = np.bincount(diagram.faces.ravel(), minlength=len(diagram.points))
-    corner = diagram.faces[facet, np.clip(5 + before + after, 0, 2)]
-    vertex = np.where(shared_before | shared_after, 0.5, 1.0)
-    vertex = np.where((before < 0) & (after < 0), 1.0 / valence[corner], vertex)
-    edge = np.where(shared_after, 0.5, 1.0)
-    component = of_polygon[diagram.polygon_of]
-    euler = np.bincount(component, vertex - edge, minlength=n) + np.bincount(of_polygon, minlength=n)
+    vertex = np.where(shared | shared[diagram.previous], 0.5, 1.0)
+    vertex[side[at_corner]] = 1.0 / valence[corner]
+    vertex -= np.where(shared, 0.5, 1.0)  # the edge that leaves it
+    euler = np.bincount(of_polygon, np.bincount(diagram.polygon_of, vertex) + 1.0, minlength=n)
     return np.asarray(np.rint(euler), dtype=np.int32)

@@ -143,8 +143,9 @@ def _inside(diagram: Diagram, cells: Cells, bad: npt.NDArray[np.bool_]) -> Embed
     component = cells.of_polygon[diagram.polygon_of]
     vertex = np.flatnonzero(bad[component])
     component = component[vertex]
-    position = diagram.positions[vertex]
-    centre = diagram.sites[diagram.site[diagram.polygon_of[vertex]]]
+    polygon = diagram.polygon_of[vertex]
+    position = diagram.at(diagram.facet[polygon], diagram.barycentric[vertex])
+    centre = diagram.sites[diagram.site[polygon]]
     distance = np.linalg.norm(position - centre, axis=1)
     chosen = []
     for _ in range(2):

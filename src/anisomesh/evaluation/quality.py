@@ -3,10 +3,15 @@
 from __future__ import annotations
 
 import numpy as np
+import numpy.typing as npt
 
 from anisomesh._arrays import Faces, FaceScalars, Points, PointTensors
 from anisomesh.errors import MetricError
 from anisomesh.surface.closest import ClosestPoints
+
+_BLOCK = 16_384  # triangles at a time, so that the memory in between is bounded
+
+Corners = npt.NDArray[np.float64]
 
 
 def anisotropic_quality(points: Points, faces: Faces, roots: PointTensors) -> FaceScalars:
@@ -29,9 +34,16 @@ def anisotropic_quality(points: Points, faces: Faces, roots: PointTensors) -> Fa
     ----------
     NASM, section 4.1 (G_avg is the mean of these).
     """
-    mean = roots[faces].mean(axis=1)
-    corners = points[faces]
-    mapped = np.einsum("fij,fcj->fci", mean, corners - corners[:, :1])
+    result = np.empty(len(faces))
+    for first in range(0, len(faces), _BLOCK):
+        block = faces[first : first + _BLOCK]
+        result[first : first + _BLOCK] = _quality(points[block], roots[block].mean(axis=1))
+    return result
+
+
+def _quality(corners: Corners, roots: PointTensors) -> FaceScalars:
+    """Return the quality of triangles (n, 3, 3) with one root each (n, 3, 3)."""
+    mapped = np.einsum("fij,fcj->fci", roots, corners - corners[:, :1])
     sides = mapped[:, [2, 0, 1]] - mapped[:, [1, 2, 0]]
     lengths = np.sqrt(np.einsum("fci,fci->fc", sides, sides))
     area = 0.5 * np.linalg.norm(np.cross(sides[:, 1], sides[:, 2]), axis=1)

@@ -13,6 +13,7 @@ from anisomesh.surface.geometry import unit
 from anisomesh.surface.mesh import Surface
 
 _ON_SIDE = 1e-6
+_BLOCK = 16_384  # queries at a time, so that the memory in between is bounded
 _MARGIN = 0.01  # of the square root of twice the area of a triangle
 _CLEAR = 1e-3  # least cosine between normals that agree clearly
 
@@ -35,8 +36,12 @@ class ClosestPoints:
 
     def locate(self, queries: Vectors) -> tuple[Rows, Vectors]:
         """Return facet (n,) and barycentric coordinates (n, 3) of the closest point to each point (n, 3)."""
-        _, facet, closest = self._query(queries)
-        return facet, barycentric(self.surface.points[self.surface.faces[facet]], closest)
+        facet, weights = np.empty(len(queries), dtype=np.int64), np.empty((len(queries), 3))
+        for first in range(0, len(queries), _BLOCK):
+            block = slice(first, first + _BLOCK)
+            _, facet[block], closest = self._query(queries[block])
+            weights[block] = barycentric(self.surface.points[self.surface.faces[facet[block]]], closest)
+        return facet, weights
 
     def normals(self, queries: Vectors) -> FaceVectors:
         """Return the normal of the surface at the closest point to each query (n, 3), of any length.
