@@ -10,7 +10,7 @@ from anisomesh.cvt.workers import Workers
 
 
 def assert_lists_hold(table, sites):
-    """Lists are sorted, have no duplicates, true distances up to a bound, and all sites within their complete radius."""
+    """Lists are sorted, without duplicates, with true distances up to a bound, complete within their radius."""
     distance = np.sqrt(((sites[:, None] - sites[None]) ** 2).sum(axis=2))
     for site in range(len(sites)):
         listed = table.neighbours[table.start[site] : table.start[site] + table.length[site]]
