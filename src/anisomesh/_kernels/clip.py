@@ -54,7 +54,7 @@ class Sites(NamedTuple):
 class Workspace(NamedTuple):
     """Buffers of one thread."""
 
-    clock: np.ndarray  # (1,) int64, counts the facets clipped
+    clock: np.ndarray  # (2,) int64, counts the facets clipped, and the slots given on this one
     stamp: np.ndarray  # (S,) int64, when this site was last given a slot
     slot: np.ndarray  # (S,)
     candidate: np.ndarray  # (C,) site of each slot
@@ -211,6 +211,67 @@ def _whole_facet(work, wa, wb, wc, slack):
     work[0, 2, _SQUARE] = wc + slack
 
 
+@inlined
+def _slot_of(site, facet, facets, sites, ws):
+    """Return the slot of a site on the facet that is being clipped, a new one if need be; -1 if there is no room."""
+    if ws.stamp[site] == ws.clock[0]:
+        return ws.slot[site]
+    j = ws.clock[1]
+    if j >= ws.candidate.shape[0]:
+        return -1
+    ws.clock[1] += 1
+    ws.stamp[site] = ws.clock[0]
+    ws.slot[site] = j
+    ws.candidate[j] = site
+    ws.queued[j] = 0
+    a, b, c = facets.faces[facet, 0], facets.faces[facet, 1], facets.faces[facet, 2]
+    _fill_row(ws.table, j, site, sites.positions, facets.points, a, b, c)
+    return j
+
+
+@inlined
+def _clip_cell(i, facet, facets, sites, ws):
+    """Clip the facet by the bisectors of the site in slot i with its neighbours.
+
+    Returns the vertex count or a negative status, the half of ``ws.work`` that holds the polygon, the radius within
+    which the list of the site had to be complete, and the slot of the site that took all where the count is 0.
+    """
+    site = ws.candidate[i]
+    wa, wb, wc = ws.table[i, 0], ws.table[i, 1], ws.table[i, 2]
+    sa, sb, sc = facets.side2[facet, 0], facets.side2[facet, 1], facets.side2[facet, 2]
+    # W and L being squares of the distance to the farthest corner and of the longest side, an error e <= 1
+    # of the coordinates moves a vertex by at most 2 e sqrt(L), and its squared distance, which is at most W,
+    # by at most 2 e (W + L) + 4 e^2 L
+    slack = 8.0 * (sites.positions.shape[1] + 4) * _UNIT_ROUNDOFF * max(wa, wb, wc)
+    spread = 2.0 * (max(wa, wb, wc) + slack + 3.0 * max(sa, sb, sc))
+    _whole_facet(ws.work, wa, wb, wc, slack)
+    radius2 = max(wa, wb, wc) + slack
+    lag = sites.stale[site]
+    n = 3
+    source = 0
+    for k in range(sites.start[site], sites.start[site] + sites.length[site]):
+        least = sites.distance[k] - lag
+        if least > 0.0 and least * least > 4.0 * radius2 * (1.0 + _SLOP):
+            break
+        j = _slot_of(sites.neighbours[k], facet, facets, sites, ws)
+        if j < 0:
+            return BUFFER_TOO_SMALL, source, 0.0, -1
+        fa, fb, fc = ws.table[j, 0] - wa, ws.table[j, 1] - wb, ws.table[j, 2] - wc
+        if fa > 0.0 and fb > 0.0 and fc > 0.0:
+            continue
+        n_lost, first = _classify(ws.work, ws.table, ws.candidate, source, n, i, j, fa, fb, fc)
+        if n_lost == 0:
+            continue
+        if n_lost == n:
+            return 0, source, 0.0, j
+        if n + 2 > ws.work.shape[1]:
+            return BUFFER_TOO_SMALL, source, 0.0, -1
+        n = _cut(ws.work, source, n, n_lost, first, j, abs(fa) + abs(fb) + abs(fc))
+        source = 1 - source
+        radius2 = _measure(ws.work, source, n - 2, n, wa, wb, wc, sa, sb, sc, slack, spread)
+    return n, source, 2.0 * np.sqrt(radius2) * (1.0 + _SLOP), -1
+
+
 @kernel
 def clip_facet(facet, owner, facets, sites, ws):
     """Write the polygons of all cells on a facet into the workspace.
@@ -219,117 +280,50 @@ def clip_facet(facet, owner, facets, sites, ws):
     START_TOO_FAR the slot of the site in question as that of the first polygon. Lists that are too short are noted in
     the workspace, all those on the facet at once.
     """
-    positions, start, count, neighbours, distance, stale, complete = sites
-    (
-        clock,
-        stamp,
-        slot,
-        candidate,
-        table,
-        queued,
-        queue,
-        polygon_slot,
-        polygon_start,
-        out_label,
-        out_vertex,
-        work,
-        all_needed,
-    ) = ws
-    a, b, c = facets.faces[facet, 0], facets.faces[facet, 1], facets.faces[facet, 2]
-    sa, sb, sc = facets.side2[facet, 0], facets.side2[facet, 1], facets.side2[facet, 2]
-    points = facets.points
-    rounding = 8.0 * (positions.shape[1] + 4) * _UNIT_ROUNDOFF
-    clock[0] += 1
-    now = clock[0]
-    _fill_row(table, 0, owner, positions, points, a, b, c)
-    stamp[owner] = now
-    slot[owner] = 0
-    candidate[0] = owner
-    queued[0] = 1
-    queue[0] = 0
-    n_slots = 1
+    ws.clock[0] += 1
+    ws.clock[1] = 0
+    ws.queue[0] = _slot_of(owner, facet, facets, sites, ws)
+    ws.queued[0] = 1
     head = 0
     tail = 1
     n_polygons = 0
     n_vertices = 0
     short = False
     while head < tail:
-        i = queue[head]
+        i = ws.queue[head]
         head += 1
-        site = candidate[i]
-        wa, wb, wc = table[i, 0], table[i, 1], table[i, 2]
-        # W and L being squares of the distance to the farthest corner and of the longest side, an error e <= 1
-        # of the coordinates moves a vertex by at most 2 e sqrt(L), and its squared distance, which is at most W,
-        # by at most 2 e (W + L) + 4 e^2 L
-        slack = rounding * max(wa, wb, wc)
-        spread = 2.0 * (max(wa, wb, wc) + slack + 3.0 * max(sa, sb, sc))
-        _whole_facet(work, wa, wb, wc, slack)
-        radius2 = max(wa, wb, wc) + slack
-        lag = stale[site]
-        n = 3
-        source = 0
-        rival = -1
-        for k in range(start[site], start[site] + count[site]):
-            least = distance[k] - lag
-            if least > 0.0 and least * least > 4.0 * radius2 * (1.0 + _SLOP):
-                break
-            other = neighbours[k]
-            if stamp[other] == now:
-                j = slot[other]
-            else:
-                if n_slots >= candidate.shape[0]:
-                    return BUFFER_TOO_SMALL
-                j = n_slots
-                n_slots += 1
-                stamp[other] = now
-                slot[other] = j
-                candidate[j] = other
-                queued[j] = 0
-                _fill_row(table, j, other, positions, points, a, b, c)
-            fa, fb, fc = table[j, 0] - wa, table[j, 1] - wb, table[j, 2] - wc
-            if fa > 0.0 and fb > 0.0 and fc > 0.0:
-                continue
-            n_lost, first = _classify(work, table, candidate, source, n, i, j, fa, fb, fc)
-            if n_lost == 0:
-                continue
-            if n_lost == n:
-                n = 0
-                rival = j
-                break
-            if n + 2 > work.shape[1]:
-                return BUFFER_TOO_SMALL
-            n = _cut(work, source, n, n_lost, first, j, abs(fa) + abs(fb) + abs(fc))
-            source = 1 - source
-            radius2 = _measure(work, source, n - 2, n, wa, wb, wc, sa, sb, sc, slack, spread)
+        n, source, needed, rival = _clip_cell(i, facet, facets, sites, ws)
+        if n < 0:
+            return n
         if n == 0:
             # only the first sites can have no part of the facet; whatever took the last of it is tried next
-            if n_polygons > 0 or queued[rival]:
+            if n_polygons > 0 or ws.queued[rival]:
                 return NO_OWNER
-            queued[rival] = 1
-            queue[tail] = rival
+            ws.queued[rival] = 1
+            ws.queue[tail] = rival
             tail += 1
             continue
-        needed = 2.0 * np.sqrt(radius2) * (1.0 + _SLOP)
-        if needed > complete[site]:
-            all_needed[site] = max(all_needed[site], needed)
+        site = ws.candidate[i]
+        if needed > sites.complete[site]:
+            ws.needed[site] = max(ws.needed[site], needed)
             if n_polygons == 0:
-                polygon_slot[0] = i
+                ws.polygon_slot[0] = i
                 return START_TOO_FAR
             short = True
-        if n_vertices + n > out_label.shape[0]:
+        if n_vertices + n > ws.label.shape[0]:
             return BUFFER_TOO_SMALL
-        polygon_slot[n_polygons] = i
-        polygon_start[n_polygons] = n_vertices
+        ws.polygon_slot[n_polygons] = i
+        ws.polygon_start[n_polygons] = n_vertices
         n_polygons += 1
         for k in range(n):
-            label = int(work[source, k, _LABEL])
-            out_label[n_vertices] = label
+            label = int(ws.work[source, k, _LABEL])
+            ws.label[n_vertices] = label
             for m in range(3):
-                out_vertex[n_vertices, m] = work[source, k, m]
+                ws.vertex[n_vertices, m] = ws.work[source, k, m]
             n_vertices += 1
-            if label >= 0 and not queued[label]:
-                queued[label] = 1
-                queue[tail] = label
+            if label >= 0 and not ws.queued[label]:
+                ws.queued[label] = 1
+                ws.queue[tail] = label
                 tail += 1
-    polygon_start[n_polygons] = n_vertices
+    ws.polygon_start[n_polygons] = n_vertices
     return LIST_TOO_SHORT if short else n_polygons
