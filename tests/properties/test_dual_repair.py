@@ -13,6 +13,7 @@ from anisomesh.dual.triangulate import dual_mesh
 from anisomesh.dual.untangle import untangle
 from anisomesh.evaluation.validity import check_validity, flipped_faces
 from anisomesh.surface.closest import ClosestPoints
+from anisomesh.surface.geometry import thickness
 from anisomesh.surface.mesh import Surface
 from anisomesh.surface.shapes import box, cad_part, open_patch, sphere, torus
 
@@ -182,3 +183,56 @@ def test_exchange_puts_a_site_on_a_missed_corner():
     assert np.linalg.norm(changed - corner, axis=1).min() == 0.0
     kept = (changed[:, None] == sites[None]).all(axis=2).any(axis=1)
     assert kept.mean() >= 0.95
+
+
+def test_a_triangle_nearest_to_another_sheet_is_turned_back():
+    # two sheets that cross: near the line where they meet a triangle of one can be nearest to the other
+    n = 12
+    sheet = open_patch(lambda x, y: 0.0 * x, n=n)
+    other = sheet.points * [1, 1, -1] + [0, 0, 0.013] + sheet.points[:, [0]] * [0, 0, -0.03]
+    reference = Surface(
+        np.concatenate([sheet.points, other]), np.concatenate([sheet.faces, sheet.faces[:, ::-1] + sheet.n_points])
+    )
+    coarse = open_patch(lambda x, y: 0.0 * x, n=5)
+    mesh = coarse.with_points(coarse.points + [0, 0, 0.002] * np.sin(40 * coarse.points[:, [0]]))
+    closest = ClosestPoints(reference)
+    assert closest.turned(mesh.points[mesh.faces]).any()
+    points, faces, left = untangle(mesh.points, mesh.faces, closest)
+    assert left == 0
+    assert not closest.turned(points[faces]).any()
+    assert_same_topology(Surface(points, faces), mesh)
+    assert len(points) < 1.3 * mesh.n_points
+
+
+def test_decimation_of_a_square_tube_leaves_no_needle_and_no_turned_face():
+    # a thin tube with many bends: what collapses is often flat, or half way between two walls
+    steps = np.array([[1, 0, 0], [0, 1, 0], [0, 0, 1], [0, 1, 0], [1, 0, 0], [0, 0, -1]] * 4)
+    path = np.cumsum(steps, axis=0)
+    surface = cubes_boundary(np.unique(path, axis=0))
+    points, faces = decimate(surface.points, surface.faces, 8, ClosestPoints(surface))
+    result = Surface(points, faces)
+    assert_same_topology(result, surface)
+    assert result.n_points < 0.9 * surface.n_points
+    assert thickness(points[faces]).min() >= 1e-3
+    assert not flipped_faces(result, surface).any()
+
+
+def cubes_boundary(cubes):
+    """Return the boundary of a union of unit cubes, at integer corners, that share faces only."""
+    quads = []
+    filled = {tuple(cube) for cube in cubes.tolist()}
+    for cube in filled:
+        for axis in range(3):
+            for side in (0, 1):
+                across = list(cube)
+                across[axis] += 2 * side - 1
+                if tuple(across) not in filled:
+                    corner = np.array(cube)
+                    corner[axis] += side
+                    u, v = np.roll(np.eye(3, dtype=int), axis, axis=1)[1:]
+                    loop = [corner, corner + u, corner + u + v, corner + v]
+                    quads.append(loop if side else loop[::-1])
+    corners = np.array(quads, dtype=float).reshape(-1, 3)
+    points, index = np.unique(corners, axis=0, return_inverse=True)
+    index = index.reshape(-1, 4)
+    return Surface(points, np.concatenate([index[:, [0, 1, 2]], index[:, [0, 2, 3]]]))

@@ -5,7 +5,7 @@ import pytest
 
 from anisomesh.errors import MeshError
 from anisomesh.surface import shapes
-from anisomesh.surface.geometry import unit_frame
+from anisomesh.surface.geometry import thickness, unit_frame
 from anisomesh.surface.mesh import Surface
 
 POINTS = np.array([[0.0, 0, 0], [1, 0, 0], [0, 1, 0], [0, 0, 1]])
@@ -73,3 +73,13 @@ def test_unit_frame_is_a_similarity_onto_diagonal_one(scale):
     assert np.linalg.norm(np.ptp(inside, axis=0)) == pytest.approx(1)
     np.testing.assert_allclose(inside.max(axis=0), -inside.min(axis=0), atol=1e-12)
     np.testing.assert_allclose(frame.to_model(inside), points, rtol=1e-13)
+
+
+def test_thickness_of_known_triangles():
+    regular = np.array([[0, 0, 0], [2, 0, 0], [1, np.sqrt(3), 0]])
+    right = np.array([[0, 0, 0], [0, 3, 0], [0, 0, 4.0]])
+    flat = np.array([[0, 0, 0], [1, 1, 1], [3, 3, 3.0]])
+    point = np.zeros((3, 3))
+    np.testing.assert_allclose(
+        thickness(np.stack([regular, right, flat, point])), [np.sqrt(3) / 4, 6 / 25, 0, 0], atol=1e-15
+    )

@@ -13,8 +13,8 @@ from anisomesh.surface.mesh import Surface
 
 _LENGTH_WEIGHT = 1e-3  # of the squared length against the squared distance to the planes
 _MIN_COSINE = 0.2  # a face turns by no more than this in one collapse
+_MIN_THICKNESS = 1e-3  # area over squared longest side of a face that a collapse may leave
 _BATCH = 0.1  # share of the collapses considered in one round
-_ATTEMPTS = 4  # at finding collapses that leave no face turned, before the work ends
 
 Floats = npt.NDArray[np.float64]
 Ints = npt.NDArray[np.int64]
@@ -46,20 +46,23 @@ def decimate(points: Points, faces: Faces, n_points: int, reference: ClosestPoin
     no face turns by more than about 80 degrees.
     """
     quadrics = _quadrics(points, faces)
-    while len(points) > n_points:
-        gone, into = _collapses(Surface(points, faces), quadrics, len(points) - n_points, reference)
+    surplus = len(points) - n_points
+    refused = np.zeros(0, dtype=np.int64)
+    while surplus > 0:
+        surface = Surface(points, faces)
+        gone, into, refused = _collapses(surface, quadrics, surplus, reference, refused)
         if len(gone) == 0:
             break
+        around = np.unique(faces[np.isin(faces, gone).any(axis=1)])
+        refused = refused[~np.isin(refused // len(points), around)]  # these may do now
         np.add.at(quadrics, into, quadrics[gone])
-        target = np.arange(len(points))
+        target = np.arange(len(points), dtype=np.int32)
         target[gone] = into
         faces = target[faces]
         faces = faces[(faces != np.roll(faces, 1, axis=1)).all(axis=1)]
-        stay = np.ones(len(points), dtype=bool)
-        stay[gone] = False
-        faces = (np.cumsum(stay) - 1)[faces].astype(np.int32)
-        points, quadrics = points[stay], quadrics[stay]
-    return points, faces
+        surplus -= len(gone)
+    used, faces = np.unique(faces, return_inverse=True)
+    return points[used], faces.reshape(-1, 3).astype(np.int32)
 
 
 def _quadrics(points: Points, faces: Faces) -> Floats:
@@ -75,13 +78,19 @@ def _quadrics(points: Points, faces: Faces) -> Floats:
     return result
 
 
-def _collapses(surface: Surface, quadrics: Floats, surplus: int, reference: ClosestPoints) -> tuple[Ints, Ints]:
-    """Return points to remove and where each goes: cheap, allowed, and with neighbourhoods that do not touch."""
+def _collapses(
+    surface: Surface, quadrics: Floats, surplus: int, reference: ClosestPoints, refused: Ints
+) -> tuple[Ints, Ints, Ints]:
+    """Return points to remove and where each goes: cheap, allowed, and with neighbourhoods that do not touch.
+
+    ``refused`` names collapses, as gone * V + into, that would leave a face turned; it is returned with those found.
+    """
     edges = surface.edges[collapsible_edges(surface)].astype(np.int64)
     gone, into = np.concatenate([edges, edges[:, ::-1]]).T
     on_boundary = np.zeros(surface.n_points, dtype=bool)
     on_boundary[surface.edges[surface.edge_face_count == 1]] = True
     allowed = ~on_boundary[gone] | on_boundary[into]
+    allowed &= ~np.isin(gone * surface.n_points + into, refused)
     gone, into = gone[allowed], into[allowed]
     place = np.concatenate([surface.points[into], np.ones((len(into), 1))], axis=1)
     area = np.bincount(surface.faces.ravel(), np.repeat(surface.face_areas, 3), minlength=surface.n_points)
@@ -90,15 +99,15 @@ def _collapses(surface: Surface, quadrics: Floats, surplus: int, reference: Clos
     order = np.argsort(cost, kind="stable")
     for pool in (order[: max(int(_BATCH * len(order)), 64)], order):
         good = pool[_keeps_normals(surface, gone[pool], into[pool])]
-        for _ in range(_ATTEMPTS):
-            if len(good) == 0:
-                break
+        while len(good):
             chosen = good[_apart(surface, gone[good], into[good])][:surplus]
             faithful = _faces_reference(surface, gone[chosen], into[chosen], reference)
-            if faithful.any():
-                return gone[chosen[faithful]], into[chosen[faithful]]
-            good = good[~np.isin(good, chosen)]
-    return np.zeros(0, dtype=np.int64), np.zeros(0, dtype=np.int64)
+            bad, done = chosen[~faithful], chosen[faithful]
+            refused = np.concatenate([refused, gone[bad] * surface.n_points + into[bad]])
+            if len(done):
+                return gone[done], into[done], refused
+            good = good[~np.isin(good, bad)]
+    return gone[:0], into[:0], refused
 
 
 def collapsible_edges(surface: Surface) -> npt.NDArray[np.bool_]:
@@ -116,11 +125,12 @@ def collapsible_edges(surface: Surface) -> npt.NDArray[np.bool_]:
 
 
 def _keeps_normals(surface: Surface, gone: Ints, into: Ints) -> npt.NDArray[np.bool_]:
-    """Return which collapses (n,) turn no face around the point that goes by too much."""
+    """Return which collapses (n,) turn no face around the point that goes by too much, nor make it a needle."""
     which, face, moved = _changed_faces(surface, gone, into)
     new = geometry.unit(geometry.face_cross(surface.points, moved))
     turned = np.einsum("nx,nx->n", new, surface.face_normals[face]) < _MIN_COSINE
-    return np.asarray(np.bincount(which, turned, minlength=len(gone)) == 0)
+    flat = geometry.thickness(surface.points[moved]) < _MIN_THICKNESS
+    return np.asarray(np.bincount(which, turned | flat, minlength=len(gone)) == 0)
 
 
 def _faces_reference(surface: Surface, gone: Ints, into: Ints, reference: ClosestPoints) -> npt.NDArray[np.bool_]:

@@ -77,7 +77,7 @@ def _flip(surface: Surface, turned: npt.NDArray[np.bool_], reference: ClosestPoi
     flips = possible_flips(surface, np.unique(surface.face_edges[turned]))
     corners = surface.points[flips.triangles].reshape(-1, 3, 3)
     change = reference.turned(corners).reshape(-1, 2).sum(axis=1) - turned[flips.pair].sum(axis=1)
-    shape = _shape(corners).reshape(-1, 2).min(axis=1)
+    shape = geometry.thickness(corners).reshape(-1, 2).min(axis=1)
     order = np.lexsort((-shape, change))
     order = order[(change < 0)[order]]
     return do_flips(surface.faces, flips, order) if len(order) else None
@@ -196,11 +196,3 @@ def _relax(surface: Surface, turned: npt.NDArray[np.bool_], reference: ClosestPo
         if reference.turned(points[surface.faces[around]]).sum() < turned.sum():
             return points
     return None
-
-
-def _shape(corners: npt.NDArray[np.float64]) -> npt.NDArray[np.float64]:
-    """Return area over squared longest side of triangles (n, 3, 3)."""
-    sides = corners - corners[:, [1, 2, 0]]
-    area = 0.5 * np.linalg.norm(np.cross(sides[:, 0], sides[:, 1]), axis=1)
-    longest = (sides**2).sum(axis=2).max(axis=1)
-    return np.asarray(np.divide(area, longest, out=np.zeros_like(area), where=longest > 0.0))

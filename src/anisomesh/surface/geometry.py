@@ -23,6 +23,14 @@ def unit(vectors: npt.NDArray[np.float64]) -> npt.NDArray[np.float64]:
     return np.asarray(np.divide(vectors, length, out=np.zeros_like(vectors), where=length > 0))
 
 
+def thickness(corners: npt.NDArray[np.float64]) -> npt.NDArray[np.float64]:
+    """Return area over squared longest side (n,) of triangles (n, 3, 3): 0 for a flat one, 0.433 for a regular one."""
+    sides = corners - corners[:, [1, 2, 0]]
+    area = 0.5 * np.linalg.norm(np.cross(sides[:, 0], sides[:, 1]), axis=1)
+    longest = (sides**2).sum(axis=2).max(axis=1)
+    return np.asarray(np.divide(area, longest, out=np.zeros_like(area), where=longest > 0.0))
+
+
 def point_normals(points: Points, faces: Faces) -> PointVectors:
     """Return area-weighted unit normals (V, 3); zero at a point without faces."""
     cross = face_cross(points, faces)
