@@ -69,6 +69,18 @@ def evaluation(n: int, iterations: int = 100) -> tuple[float, float, int]:
     return float(np.mean(voronoi.seconds)), float(np.median(queries)), surface.n_faces
 
 
+def embedding_time(n: int) -> float:
+    """Return median seconds of the embedding without the estimate of the curvature."""
+    surface = ring(n)
+    tensors = compute_metric(surface).tensors
+    times = []
+    for _ in range(5):
+        start = time.perf_counter()
+        embed(surface, tensors)
+        times.append(time.perf_counter() - start)
+    return float(np.median(times))
+
+
 def whole_run(n: int, ratio: float) -> dict[str, float]:
     return anisomesh.remesh(ring(n), ratio=ratio).seconds
 
@@ -133,13 +145,17 @@ def main() -> None:
         runs = sorted((whole_run(6_000, ratio) for _ in range(3)), key=lambda seconds: seconds["total"])
         stages = ", ".join(f"{name} {value:.2f}" for name, value in runs[1].items())
         print(f"remesh, 6,000 vertices at {ratio:.0%}: {stages} s")
+    print(f"embedding, 6,000 vertices: {embedding_time(6_000):.3f} s")
     times = []
     for n in options.sizes:
         mean, query, _ = evaluation(n, iterations=12)
-        times.append(mean)
-        print(f"evaluation, {n:,} sites: {mean * 1e3:.1f} ms, query {query * 1e3:.1f} ms", flush=True)
-    exponent = np.polyfit(np.log(options.sizes), np.log(times), 1)[0]
-    print(f"evaluation time grows as n^{exponent:.2f}")
+        times.append((mean, embedding_time(n)))
+        print(
+            f"{n:,} sites: evaluation {mean * 1e3:.1f} ms, query {query * 1e3:.1f} ms; embedding {times[-1][1]:.2f} s",
+            flush=True,
+        )
+    growth = np.polyfit(np.log(options.sizes), np.log(times), 1)[0]
+    print(f"growth: evaluation n^{growth[0]:.2f}, embedding n^{growth[1]:.2f}")
     folder = str(Path(__file__).parent.resolve())
     print("peak bytes a site above what was there before:", fresh(MEMORY.format(n=options.sizes[-1], folder=folder)))
     code = "import time; t = time.perf_counter(); import anisomesh; print(time.perf_counter() - t)"
