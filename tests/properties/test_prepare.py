@@ -292,6 +292,15 @@ def test_a_face_and_its_copy_leave_one(order):
     assert prepared.report.faces_duplicate == patch.n_faces
 
 
+def test_two_faces_back_to_back_are_one():
+    # every edge has two faces and they agree in orientation, but it is no surface of triangles
+    pillow = Surface(np.eye(3), np.array([[0, 1, 2], [0, 2, 1]]))
+    prepared = prepare(pillow)
+    check(prepared, pillow)
+    np.testing.assert_array_equal(prepared.surface.faces, [[0, 1, 2]])
+    assert prepared.report.faces_duplicate == 1
+
+
 def test_unused_points_are_dropped():
     box = shapes.box(n=1)
     padded = Surface(np.vstack([np.full((5, 3), 9.0), box.points]), box.faces + 5)

@@ -227,6 +227,7 @@ def _is_clean(surface: Surface, labels: PointLabels) -> bool:
         len(np.unique(gaps)) == len(gaps)
         and topology.count_nonmanifold_points(faces) == 0
         and not degenerate.is_degenerate(surface.points, labels[faces]).any()
+        and duplicates.kept(faces).all()
     )
 
 
