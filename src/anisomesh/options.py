@@ -35,6 +35,8 @@ class RemeshOptions:
         Worker threads; they do not change the result.
     lloyd_iterations, max_iterations
         Iterations of Lloyd's algorithm at the start and bound on those of L-BFGS after it.
+    embedding_iterations
+        Bound on the local/global steps of the direct embedding.
     weld_tolerance
         Points of the input up to this distance (model units) become one.
     crease_angle
@@ -50,6 +52,7 @@ class RemeshOptions:
     threads: int = 2
     lloyd_iterations: int = 9
     max_iterations: int = 150
+    embedding_iterations: int = 10
     weld_tolerance: float = 0.0
     crease_angle: float = 45.0
 
@@ -64,7 +67,13 @@ class RemeshOptions:
             raise OptionError(f"embedding = {self.embedding!r}; expected 'direct'")
         if not 0.0 <= self.crease_angle <= 180.0:
             raise OptionError(f"crease_angle = {self.crease_angle}; expected 0 to 180 degrees")
-        for name, low in (("seed", 0), ("threads", 1), ("lloyd_iterations", 0), ("max_iterations", 0)):
+        for name, low in (
+            ("seed", 0),
+            ("threads", 1),
+            ("lloyd_iterations", 0),
+            ("max_iterations", 0),
+            ("embedding_iterations", 1),
+        ):
             if getattr(self, name) < low:
                 raise OptionError(f"{name} = {getattr(self, name)}; expected at least {low}")
 

@@ -17,11 +17,12 @@ from anisomesh.cvt.voronoi import RestrictedVoronoi
 from anisomesh.dual.exchange import exchange_sites
 from anisomesh.dual.refine import Refined, refine
 from anisomesh.embedding.direct import embed
-from anisomesh.errors import MeshError, MetricError, OptionError
+from anisomesh.errors import MetricError, OptionError
 from anisomesh.evaluation.validity import Validity, check_validity
 from anisomesh.metric.tensor import compute_metric
 from anisomesh.options import OnStep, RemeshOptions, StepInfo
 from anisomesh.result import RemeshResult
+from anisomesh.surface.convert import as_surface
 from anisomesh.surface.geometry import unit_frame
 from anisomesh.surface.mesh import Surface
 from anisomesh.surface.prepare import Prepared, prepare
@@ -101,7 +102,7 @@ def remesh(
             wanted = split.interpolate(_at_prepared(np.asarray(wanted), given, prepared)) * frame.scale**2
         metric = compute_metric(working, wanted)
     with run.stage("embed"):
-        embedding = embed(working, metric.tensors)
+        embedding = embed(working, metric.tensors, max_iterations=options.embedding_iterations)
     with run.stage("cvt"):
         voronoi = RestrictedVoronoi(embedding.points, working.faces, threads=options.threads)
         ordered = Surface(working.points, voronoi.faces)
@@ -131,30 +132,6 @@ def remesh(
         validity=validity,
         seconds=run.total_seconds(),
         warnings=tuple(_warnings(n, surface, refined, validity)),
-    )
-
-
-def as_surface(mesh: Any, faces: npt.NDArray[Any] | None = None) -> Surface:
-    """Return a :class:`Surface` from points and faces, a surface, a ``trimesh.Trimesh`` or a ``pyvista.PolyData``.
-
-    Raises
-    ------
-    MeshError
-        If the object is none of these, or has faces that are no triangles.
-    """
-    if isinstance(mesh, Surface):
-        return mesh
-    if faces is not None:
-        return Surface(np.asarray(mesh), np.asarray(faces))
-    if hasattr(mesh, "regular_faces"):  # pyvista
-        if not mesh.is_all_triangles:
-            raise MeshError("the PyVista mesh has faces that are no triangles; call its triangulate() first")
-        return Surface(np.asarray(mesh.points), np.asarray(mesh.regular_faces))
-    if hasattr(mesh, "vertices") and hasattr(mesh, "faces"):  # trimesh
-        return Surface(np.asarray(mesh.vertices), np.asarray(mesh.faces))
-    raise MeshError(
-        f"cannot read a mesh from {type(mesh).__name__}; expected points and faces, a Surface, a trimesh.Trimesh or a "
-        "pyvista.PolyData"
     )
 
 

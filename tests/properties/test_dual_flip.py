@@ -7,10 +7,10 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from anisomesh.dual.flip import do_flips, flip_for_shape, possible_flips
-from anisomesh.dual.place import sharp_edges
 from anisomesh.evaluation.quality import anisotropic_quality
 from anisomesh.surface import topology
 from anisomesh.surface.closest import ClosestPoints
+from anisomesh.surface.features import sharp_edges
 from anisomesh.surface.mesh import Surface
 from anisomesh.surface.shapes import box, cad_part, open_patch, sphere, torus
 

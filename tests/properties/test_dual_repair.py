@@ -7,12 +7,13 @@ from anisomesh.cvt.voronoi import RestrictedVoronoi
 from anisomesh.dual.cells import cells_of
 from anisomesh.dual.decimate import collapsible_edges, decimate
 from anisomesh.dual.exchange import exchange_sites
-from anisomesh.dual.place import corners, crease_positions, creased_cells, sharp_edges, snap_to_missed
+from anisomesh.dual.place import crease_positions, creased_cells, snap_to_missed
 from anisomesh.dual.simplicial import simplicial_mesh
 from anisomesh.dual.triangulate import dual_mesh
 from anisomesh.dual.untangle import untangle
 from anisomesh.evaluation.validity import check_validity, flipped_faces
 from anisomesh.surface.closest import ClosestPoints
+from anisomesh.surface.features import corners, sharp_edges
 from anisomesh.surface.geometry import thickness
 from anisomesh.surface.mesh import Surface
 from anisomesh.surface.shapes import box, cad_part, open_patch, sphere, torus

@@ -6,7 +6,8 @@ import numpy as np
 import pytest
 
 from anisomesh.errors import OptionError
-from anisomesh.evaluation.distance import sample_uniformly, squared_distances, surface_distance
+from anisomesh.evaluation.distance import squared_distances, surface_distance
+from anisomesh.evaluation.sampling import points_on_faces
 from anisomesh.surface.mesh import Surface
 from anisomesh.surface.shapes import ellipsoid, open_patch, sphere, torus
 
@@ -92,7 +93,7 @@ def test_distance_to_a_triangle_against_a_search_over_its_points():
 
 def test_samples_are_uniform_by_area():
     surface = ellipsoid((1.0, 0.5, 0.2), 2)
-    samples = sample_uniformly(surface, 40_000, np.random.default_rng(0))
+    samples, _ = points_on_faces(surface, 40_000, np.random.default_rng(0))
     assert squared_distances(samples, surface).max() < 1e-20
     share = surface.face_areas / surface.area
     upper = surface.points[surface.faces].mean(axis=1)[:, 0] > 0.3

@@ -9,32 +9,12 @@ from anisomesh._arrays import Faces, Points
 from anisomesh.cvt.diagram import Diagram
 from anisomesh.cvt.voronoi import RestrictedVoronoi
 from anisomesh.dual.cells import Cells
-from anisomesh.surface import geometry
 from anisomesh.surface.closest import ClosestPoints
+from anisomesh.surface.features import corners
 from anisomesh.surface.mesh import Surface
 
 _SHARPNESS = 100.0
-_TURN = 45.0  # degrees by which a crease turns at a corner
 _MISSED = 0.05  # mean edge lengths between a corner and the mesh, from which on it counts as missed
-
-
-def sharp_edges(surface: Surface, angle: float) -> npt.NDArray[np.bool_]:
-    """Return which edges (E,) have faces whose normals differ by more than an angle in degrees."""
-    first, second = surface.edge_faces.T
-    cosine = np.einsum("ex,ex->e", surface.face_normals[first], surface.face_normals[second])
-    return np.asarray((second >= 0) & (cosine < np.cos(np.radians(angle))))
-
-
-def corners(surface: Surface, sharp: npt.NDArray[np.bool_]) -> npt.NDArray[np.bool_]:
-    """Return which points (V,) are ends of sharp edges but not of two that go on in about the same direction."""
-    ends = surface.edges[sharp]
-    along = geometry.unit(surface.points[ends[:, 1]] - surface.points[ends[:, 0]])
-    count = np.bincount(ends.ravel(), minlength=surface.n_points)
-    outward = np.zeros((surface.n_points, 3))
-    np.add.at(outward, ends[:, 0], along)
-    np.add.at(outward, ends[:, 1], -along)
-    straight = (count == 2) & (np.linalg.norm(outward, axis=1) < 2.0 * np.sin(np.radians(_TURN) / 2.0))
-    return np.asarray((count > 0) & ~straight)
 
 
 def creased_cells(

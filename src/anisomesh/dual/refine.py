@@ -13,13 +13,14 @@ from anisomesh.cvt.voronoi import RestrictedVoronoi
 from anisomesh.dual.cells import Cells, cells_of
 from anisomesh.dual.decimate import decimate
 from anisomesh.dual.flip import flip_for_shape
-from anisomesh.dual.place import crease_positions, creased_cells, sharp_edges, snap_to_missed
+from anisomesh.dual.place import crease_positions, creased_cells, snap_to_missed
 from anisomesh.dual.simplicial import simplicial_mesh
 from anisomesh.dual.triangulate import dual_mesh
 from anisomesh.dual.untangle import untangle
 from anisomesh.evaluation.quality import transfer_metric_roots
 from anisomesh.metric.tensor import metric_root
 from anisomesh.surface.closest import ClosestPoints
+from anisomesh.surface.features import sharp_edges
 from anisomesh.surface.mesh import Surface
 
 MAX_ROUNDS = 10

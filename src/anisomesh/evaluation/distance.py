@@ -9,6 +9,7 @@ import numpy as np
 
 from anisomesh._arrays import Floats, Points
 from anisomesh.errors import OptionError
+from anisomesh.evaluation.sampling import points_on_faces
 from anisomesh.surface.closest import ClosestPoints
 from anisomesh.surface.mesh import Surface
 
@@ -95,19 +96,9 @@ def squared_distances(points: Points, surface: Surface) -> Floats:
     return ClosestPoints(surface).squared_distances(points)
 
 
-def sample_uniformly(surface: Surface, count: int, rng: np.random.Generator) -> Points:
-    """Draw points (count, 3) uniformly by area; a surface without area is sampled at its faces alike."""
-    areas = surface.face_areas
-    share = areas / surface.area if surface.area > 0.0 else np.full(surface.n_faces, 1.0 / surface.n_faces)
-    face = rng.choice(surface.n_faces, size=count, p=share)
-    root, second = np.sqrt(rng.random(count)), rng.random(count)
-    weights = np.stack([1.0 - root, root * (1.0 - second), root * second], axis=1)
-    return np.asarray(np.einsum("nc,ncx->nx", weights, surface.points[surface.faces[face]]))
-
-
 def _one_way(a: Surface, b: Surface, samples: int, rng: np.random.Generator) -> tuple[float, float]:
     corners = a.points[np.unique(a.faces)]
     midpoints = a.points[a.edges].mean(axis=1)
-    queries = np.concatenate([sample_uniformly(a, samples, rng), corners, midpoints])
+    queries = np.concatenate([points_on_faces(a, samples, rng)[0], corners, midpoints])
     squared = squared_distances(queries, b)
     return float(np.sqrt(squared.max())), float(squared[:samples].mean())

@@ -9,7 +9,7 @@ import numpy as np
 import numpy.typing as npt
 
 from anisomesh._arrays import FaceMask, FaceVectors, Points
-from anisomesh.surface.geometry import unit
+from anisomesh.surface.geometry import corner_angles, unit
 from anisomesh.surface.mesh import Surface
 
 _ON_SIDE = 1e-6
@@ -107,7 +107,9 @@ class ClosestPoints:
     @cached_property
     def _point_normals(self) -> Vectors:
         surface = self.surface
-        return _summed(surface.faces, _corner_angles(surface), surface.face_normals, surface.n_points)
+        return _summed(
+            surface.faces, corner_angles(surface.points[surface.faces]), surface.face_normals, surface.n_points
+        )
 
 
 def barycentric(corners: npt.NDArray[np.float64], points: Points) -> npt.NDArray[np.float64]:
@@ -138,11 +140,3 @@ def _summed(
     terms = weight[:, :, None] * normals[:, None, :]
     columns = [np.bincount(target.ravel(), terms[:, :, axis].ravel(), minlength=size) for axis in range(3)]
     return np.stack(columns, axis=1)
-
-
-def _corner_angles(surface: Surface) -> npt.NDArray[np.float64]:
-    corners = surface.points[surface.faces]
-    ahead = unit(corners[:, [1, 2, 0]] - corners)
-    back = unit(corners[:, [2, 0, 1]] - corners)
-    sine = np.linalg.norm(np.cross(ahead, back), axis=2)
-    return np.asarray(np.arctan2(sine, np.einsum("fcx,fcx->fc", ahead, back)))

@@ -31,6 +31,14 @@ def thickness(corners: npt.NDArray[np.float64]) -> npt.NDArray[np.float64]:
     return np.asarray(np.divide(area, longest, out=np.zeros_like(area), where=longest > 0.0))
 
 
+def corner_angles(corners: npt.NDArray[np.float64]) -> npt.NDArray[np.float64]:
+    """Return the angles in radians (n, 3) at the corners of triangles (n, 3, 3); 0 beside a side without length."""
+    ahead = unit(corners[:, [1, 2, 0]] - corners)
+    back = unit(corners[:, [2, 0, 1]] - corners)
+    sine = np.linalg.norm(np.cross(ahead, back), axis=2)
+    return np.asarray(np.arctan2(sine, np.einsum("fcx,fcx->fc", ahead, back)))
+
+
 def point_normals(points: Points, faces: Faces) -> PointVectors:
     """Return area-weighted unit normals (V, 3); zero at a point without faces."""
     cross = face_cross(points, faces)

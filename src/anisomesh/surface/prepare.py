@@ -223,7 +223,7 @@ def _is_clean(surface: Surface, labels: PointLabels) -> bool:
         return False
     open_sides = surface.edge_face_count[surface.face_edges.ravel()] == 1
     gaps = topology.edges_of(labels[faces])[1].ravel()[open_sides]
-    return (
+    return bool(
         len(np.unique(gaps)) == len(gaps)
         and topology.count_nonmanifold_points(faces) == 0
         and not degenerate.is_degenerate(surface.points, labels[faces]).any()
