@@ -13,27 +13,18 @@ import numpy as np
 from scipy.spatial import cKDTree
 
 import anisomesh
-from anisomesh.evaluation.distance import surface_distance
-from anisomesh.surface.geometry import unit_frame
+from anisomesh.surface.features import points_along, sharp_edges
 from anisomesh.surface.mesh import Surface
 from anisomesh.surface.shapes import cad_features, cad_part
 
 REACH = 0.1  # of the mean edge length: a point of a crease is covered if an edge of the result is so near
-BEND = np.radians(5.0)  # and its faces meet at such an angle at least
+BEND = 5.0  # and its faces differ by so many degrees at least
 
 
-def crease_points(surface: Surface, edges: np.ndarray, spacing: float) -> np.ndarray:
-    ends = surface.points[edges]
-    count = np.maximum(np.ceil(np.linalg.norm(ends[:, 1] - ends[:, 0], axis=1) / spacing), 1).astype(int)
-    which = np.repeat(np.arange(len(edges)), count)
-    share = (np.arange(len(which)) - np.repeat(np.cumsum(count) - count, count) + 0.5) / count[which]
-    return ends[which, 0] * (1 - share)[:, None] + ends[which, 1] * share[:, None]
-
-
-def bent_edges(surface: Surface) -> np.ndarray:
-    pairs = surface.edge_faces
-    cosine = np.einsum("ex,ex->e", surface.face_normals[pairs[:, 0]], surface.face_normals[pairs[:, 1]])
-    return surface.edges[cosine < np.cos(BEND)]
+def edges_between(surface: Surface, ends: np.ndarray) -> np.ndarray:
+    """Return which edges (E,) of a surface join these pairs of points (n, 2)."""
+    keys = [np.sort(pairs, axis=1) @ [surface.n_points, 1] for pairs in (surface.edges.astype(np.int64), ends)]
+    return np.isin(*keys)
 
 
 def measure_part(resolution: int, ratio: float, final: float | None) -> str:
@@ -41,11 +32,11 @@ def measure_part(resolution: int, ratio: float, final: float | None) -> str:
     result = anisomesh.remesh(part, ratio=ratio, final_sharpness=final).surface
     edge = float(result.edge_lengths.mean())
     corner = cKDTree(result.points).query(part.points[features.corners])[0] / edge
-    fine = cKDTree(crease_points(result, bent_edges(result), 0.02 * edge))
+    fine = cKDTree(points_along(result, sharp_edges(result, BEND), 0.02 * edge))
     covered = []
     for weak in (False, True):
         chosen = features.creases[features.weak == weak]
-        distance = fine.query(crease_points(part, chosen, 0.1 * edge))[0]
+        distance = fine.query(points_along(part, edges_between(part, chosen), 0.1 * edge))[0]
         covered.append(float((distance < REACH * edge).mean()))
     late = "" if final is None else f", then s = {final:g}"
     return (
@@ -55,12 +46,11 @@ def measure_part(resolution: int, ratio: float, final: float | None) -> str:
 
 
 def measure_mesh(path: Path, ratio: float) -> str:
-    result = anisomesh.remesh(anisomesh.load(path), ratio=ratio)
-    frame = unit_frame(result.prepared.points)
-    a = result.prepared.with_points(frame.to_unit(result.prepared.points))
-    distance = surface_distance(a, Surface(frame.to_unit(result.surface.points), result.surface.faces))
+    surface = anisomesh.load(path)
+    result = anisomesh.remesh(surface, ratio=ratio).surface
+    distance = anisomesh.evaluate(surface, result).distance
     both = distance.mean_square_ab + distance.mean_square_ba
-    return f"| {path.stem}, {ratio:.0%} | {result.surface.n_points:,} | {distance.hausdorff:.2e} | {both:.2e} |"
+    return f"| {path.stem}, {ratio:.0%} | {result.n_points:,} | {distance.hausdorff:.2e} | {both:.2e} |"
 
 
 def main() -> None:

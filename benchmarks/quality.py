@@ -17,12 +17,6 @@ from typing import Any
 import numpy as np
 
 import anisomesh
-from anisomesh.evaluation.distance import surface_distance
-from anisomesh.evaluation.quality import anisotropic_quality, transfer_metric_roots
-from anisomesh.metric.tensor import compute_metric, metric_root
-from anisomesh.surface.closest import ClosestPoints
-from anisomesh.surface.geometry import unit_frame
-from anisomesh.surface.mesh import Surface
 from anisomesh.surface.topology import connected_components
 
 OUT = Path(__file__).parent / "out" / "quality.jsonl"
@@ -40,24 +34,17 @@ def closed_meshes(data: Path) -> list[Path]:
 
 def measure(path: Path, ratio: float, sharpness: float) -> dict[str, Any]:
     result = anisomesh.remesh(anisomesh.load(path), ratio=ratio, sharpness=sharpness)
-    frame = unit_frame(result.prepared.points)
-    reference = result.prepared.with_points(frame.to_unit(result.prepared.points))
-    surface = Surface(frame.to_unit(result.surface.points), result.surface.faces)
-    roots = metric_root(compute_metric(reference).tensors)
-    quality = anisotropic_quality(
-        surface.points, surface.faces, transfer_metric_roots(ClosestPoints(reference), roots, surface.points)
-    )
-    distance = surface_distance(reference, surface)
-    n_components = connected_components(reference.faces, reference.n_points)[0]
+    evaluation = anisomesh.evaluate(result.prepared, result.surface)
+    distance = evaluation.distance
     return {
         "mesh": path.stem,
         "ratio": ratio,
         "sharpness": sharpness,
-        "g_mean": float(quality.mean()),
-        "g_min": float(quality.min()),
+        "g_mean": evaluation.shape.g_mean,
+        "g_min": evaluation.shape.g_min,
         "mean_square": distance.mean_square_ab + distance.mean_square_ba,
         "hausdorff": distance.hausdorff,
-        "components_input": n_components,
+        "components_input": connected_components(result.prepared.faces, result.prepared.n_points)[0],
         **result.report(),
     }
 

@@ -14,6 +14,7 @@ from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
     from anisomesh.errors import AnisomeshError, MeshError, MeshFileError, MetricError, OptionError
+    from anisomesh.evaluation.report import Evaluation, evaluate
     from anisomesh.options import RemeshOptions, StepInfo
     from anisomesh.picture import side_by_side
     from anisomesh.pipeline import remesh
@@ -26,6 +27,7 @@ if TYPE_CHECKING:
 
 __all__ = [
     "AnisomeshError",
+    "Evaluation",
     "MeshError",
     "MeshFileError",
     "MetricError",
@@ -35,6 +37,7 @@ __all__ = [
     "StepInfo",
     "Surface",
     "__version__",
+    "evaluate",
     "load",
     "remesh",
     "sample",
@@ -45,6 +48,7 @@ __all__ = [
 
 _HOME = {
     "AnisomeshError": "errors",
+    "Evaluation": "evaluation.report",
     "MeshError": "errors",
     "MeshFileError": "errors",
     "MetricError": "errors",
@@ -53,6 +57,7 @@ _HOME = {
     "RemeshResult": "result",
     "StepInfo": "options",
     "Surface": "surface.mesh",
+    "evaluate": "evaluation.report",
     "load": "surface.io",
     "remesh": "pipeline",
     "sample": "surface.shapes",

@@ -23,7 +23,7 @@ def stretch_along_z():
 
 
 def test_every_example_is_tested():
-    assert {path.stem for path in FOLDER.glob("*.py")} == {"remesh_a_surface", "own_metric"}
+    assert {path.stem for path in FOLDER.glob("*.py")} == {"remesh_a_surface", "own_metric", "gallery"}
 
 
 def test_remesh_a_surface(tmp_path, capsys, torus_obj):
@@ -41,3 +41,12 @@ def test_own_metric_stretches_the_triangles_along_z(stretch_along_z):
 def test_own_metric_keeps_the_open_cylinder(stretch_along_z):
     validity = stretch_along_z.report()["validity"]
     assert (validity["boundary_loops"], validity["components"], validity["euler"]) == (2, 1, 0)
+
+
+def test_gallery_draws_the_results(tmp_path, capsys):
+    from PIL import Image
+
+    example("gallery").main(str(tmp_path / "three.png"))
+    with Image.open(tmp_path / "three.png") as image:
+        assert image.width == 2 * 3 * 480
+    assert "three.png" in capsys.readouterr().out

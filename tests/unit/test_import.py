@@ -22,9 +22,9 @@ def test_importing_the_package_loads_nothing_heavy():
     assert not modules_after("import anisomesh") & (HEAVY | {"numpy"})
 
 
-@pytest.mark.parametrize("words", [["--help"], ["remesh", "--help"], ["info", "--help"], ["demo", "--help"]])
+@pytest.mark.parametrize("words", ["", "remesh", "info", "demo", "figure", "figure result", "figure strip"])
 def test_help_loads_nothing_heavy(words):
-    code = f"from anisomesh.cli.main import main\nassert main({words!r}) == 0"
+    code = f"from anisomesh.cli.main import main\nassert main({[*words.split(), '--help']!r}) == 0"
     assert not modules_after(code) & HEAVY
 
 

@@ -4,9 +4,9 @@ from __future__ import annotations
 
 from pathlib import Path
 
-from anisomesh._kernels import diagram, integrate, neighbours
+from anisomesh._kernels import diagram, integrate, intersections, neighbours
 
-_ENTRY_POINTS = (
+_REMESH = (
     integrate.integrate_chunk,
     integrate.gather,
     diagram.count_chunk,
@@ -17,14 +17,17 @@ _ENTRY_POINTS = (
     neighbours.limit_radius,
     neighbours.walk,
 )
+_EVALUATE = (intersections.choose_axes, intersections.sort_into_tree, intersections.find_pairs)
+ENTRY_POINTS = {"remesh": _REMESH, "evaluate": _EVALUATE}
+"""What each kind of work calls."""
 
 
-def kernels_cached() -> bool:
-    """Return whether compiled code of every kernel, newer than its source, is on disk or none is needed."""
+def kernels_cached(work: str = "remesh") -> bool:
+    """Return whether every kernel of this work is on disk as compiled code newer than its source, or none is needed."""
     if not hasattr(integrate.gather, "py_func"):  # compilation is switched off
         return True
     newest = max(path.stat().st_mtime for path in Path(__file__).parent.glob("*.py"))
-    for kernel in _ENTRY_POINTS:
+    for kernel in ENTRY_POINTS[work]:
         function = kernel.py_func
         pattern = f"{function.__module__.rsplit('.', 1)[-1]}.{function.__qualname__}-*.nbi"
         indices = list(Path(kernel.stats.cache_path or "").glob(pattern))

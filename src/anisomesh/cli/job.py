@@ -42,10 +42,7 @@ class Outputs:
             If a picture was asked for and cannot be made here.
         """
         for path in self.paths:
-            if path.is_dir():
-                raise typer.BadParameter(f"{path} is a folder; give the name of a file in it")
-            if not path.parent.is_dir():
-                raise typer.BadParameter(f"{path}: there is no folder {path.parent}; create it first")
+            check_place(path)
         if len({path.resolve() for path in self.paths}) < len(self.paths):
             raise typer.BadParameter("two outputs have the same file name; give each its own")
         from anisomesh.surface.io import FORMATS
@@ -55,11 +52,7 @@ class Outputs:
         if self.rvd is not None and self.rvd.suffix.lower() not in (".vtu", ".obj"):
             raise typer.BadParameter(f"--rvd {self.rvd}: expected a file name ending in .vtu or .obj")
         if self.picture is not None:
-            if self.picture.suffix.lower() != ".png":
-                raise typer.BadParameter(f"--picture {self.picture}: expected a file name ending in .png")
-            from anisomesh.picture import require_renderer
-
-            require_renderer()
+            check_picture(self.picture, "--picture")
 
     def write(self, result: RemeshResult, facts: dict[str, Any], display: Display) -> None:
         """Write the files, each by way of a temporary file that is renamed when it is complete."""
@@ -77,6 +70,37 @@ class Outputs:
             from anisomesh.picture import side_by_side
 
             side_by_side(result.prepared, result.surface, self.picture)
+
+
+def check_place(path: Path) -> None:
+    """Find out that a file cannot be where it is wanted.
+
+    Raises
+    ------
+    typer.BadParameter
+        If its folder does not exist or its name is that of a folder.
+    """
+    if path.is_dir():
+        raise typer.BadParameter(f"{path} is a folder; give the name of a file in it")
+    if not path.parent.is_dir():
+        raise typer.BadParameter(f"{path}: there is no folder {path.parent}; create it first")
+
+
+def check_picture(path: Path, option: str) -> None:
+    """Find out that a picture cannot be drawn here, or not into this file, named by this option.
+
+    Raises
+    ------
+    typer.BadParameter
+        If the suffix is wrong.
+    AnisomeshError
+        If nothing can be drawn on this machine.
+    """
+    from anisomesh.picture import FORMATS, require_renderer
+
+    if path.suffix.lower() not in FORMATS:
+        raise typer.BadParameter(f"{option} {path}: expected a file name ending in {' or '.join(FORMATS)}")
+    require_renderer()
 
 
 def read(path: Path) -> tuple[Surface, float]:

@@ -11,7 +11,7 @@ from typing import Annotated
 
 import typer
 
-from anisomesh.cli import demo, info, remesh
+from anisomesh.cli import benchmark, demo, evaluate, figure, info, remesh
 from anisomesh.errors import AnisomeshError
 
 # The base class of all errors in the arguments; it is public only through this subclass.
@@ -24,8 +24,11 @@ app = typer.Typer(
     context_settings={"help_option_names": ["-h", "--help"]},
 )
 app.command("remesh")(remesh.command)
+app.command("evaluate")(evaluate.command)
+app.add_typer(figure.app, name="figure")
 app.command("info")(info.command)
 app.command("demo")(demo.command)
+app.command("benchmark")(benchmark.command)
 
 
 def _print_version(wanted: bool) -> None:

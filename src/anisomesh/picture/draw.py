@@ -1,104 +1,112 @@
-"""Drawing into one panel: a surface with its edges, values in colour, cells, the frame of the close-up."""
+"""Drawing one panel: a surface with its edges, in grey or in colours, or Voronoi cells, as an array of pixels."""
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 import numpy.typing as npt
 
-from anisomesh._arrays import Indices, Points
-from anisomesh.picture.view import View
+from anisomesh.picture.camera import View
+from anisomesh.picture.cells import Cells
+from anisomesh.picture.colouring import Colouring
+from anisomesh.picture.edges import edge_style
 from anisomesh.surface.mesh import Surface
 
-GREY, INK, ACCENT = "#dfe2e7", "#14171c", "#c8321e"
-BAR: dict[str, Any] = {
-    "vertical": True,
-    "position_x": 0.88,
-    "position_y": 0.03,
-    "width": 0.08,
-    "height": 0.35,
-    "n_labels": 4,
-    "fmt": "%.1f",
-    "color": INK,
-    "title_font_size": 18,
-    "label_font_size": 16,
-}
+GREY, INK = "#dfe2e7", "#14171c"
+_SHADING: dict[str, Any] = {"smooth_shading": True, "split_sharp_edges": True, "feature_angle": 30.0}
+_GREY_MATERIAL: dict[str, Any] = {"ambient": 0.3, "diffuse": 0.7, "specular": 0.0}
+_COLOUR_MATERIAL: dict[str, Any] = {"ambient": 0.5, "diffuse": 0.5, "specular": 0.0}
+_LIGHTS = (((0.0, 0.0, 1.0), 0.68), ((-1.0, 1.4, 1.0), 0.5), ((1.5, -0.3, 0.6), 0.25))
+_LIFT = 4e-3
+
+Pixels = npt.NDArray[np.uint8]
 
 
-@dataclass(frozen=True, kw_only=True)
-class Cells:
-    """Polygons to draw with one colour per cell.
+def render(
+    shown: Surface | Cells,
+    view: View,
+    size: tuple[int, int],
+    *,
+    colouring: Colouring | None = None,
+    scale: float = 1.0,
+) -> Pixels:
+    """Return a picture (height, width, 3) of a surface or of cells on white.
 
     Parameters
     ----------
-    points
-        Corners (P, 3) in model units.
-    offsets
-        Where each polygon starts in ``corners``, and the end of the last (polygons + 1,).
-    corners
-        The point at each corner of each polygon, one polygon after the other.
-    labels
-        The cell of each polygon (polygons,).
+    shown
+        What to draw.
+    view
+        From where.
+    size
+        Width and height in pixels.
+    colouring
+        Colours of the faces of a surface; light grey if None.
+    scale
+        Pixels per pixel of a picture of normal size; lines get so much wider.
     """
+    plotter = _plotter(size)
+    try:
+        if isinstance(shown, Cells):
+            _draw_cells(plotter, shown, view, scale)
+        else:
+            _draw_surface(plotter, shown, colouring, edges=_edges(shown, view, size, scale))
+        _look(plotter, view, reach=float(np.linalg.norm(shown.points - view.centre, axis=1).max()))
+        return np.asarray(plotter.screenshot(return_img=True), dtype=np.uint8)
+    finally:
+        plotter.close()
 
-    points: Points
-    offsets: Indices
-    corners: Indices
-    labels: Indices
+
+def _plotter(size: tuple[int, int]) -> Any:
+    import pyvista
+    from vtkmodules.vtkCommonCore import vtkLogger
+
+    vtkLogger.SetStderrVerbosity(vtkLogger.VERBOSITY_ERROR)
+    plotter: Any = pyvista.Plotter(off_screen=True, border=False, lighting="none", window_size=list(size))
+    plotter.set_background("white")
+    for position, intensity in _LIGHTS:
+        plotter.add_light(pyvista.Light(light_type="camera light", position=position, intensity=intensity))
+    plotter.enable_anti_aliasing("ssaa")
+    return plotter
 
 
-def look(plotter: Any, view: View, reach: float) -> None:
-    """Point the camera of the current panel, from a distance beyond everything in it."""
+def _look(plotter: Any, view: View, reach: float) -> None:
+    """Point the camera, from a distance beyond everything."""
     camera = plotter.camera
     camera.focal_point = view.centre
-    camera.position = view.centre + reach * view.axes[2]
+    camera.position = view.centre + 1.1 * (reach or 1.0) * view.axes[2]
     camera.up = view.axes[1]
     camera.parallel_projection = True
     camera.parallel_scale = view.half_height
     plotter.renderer.ResetCameraClippingRange()
 
 
-def draw_surface(plotter: Any, surface: Surface, pixels: float) -> None:
-    """Draw a surface in light grey, smooth but for its creases, with its edges.
+def _draw_surface(plotter: Any, surface: Surface, colouring: Colouring | None, edges: dict[str, Any]) -> None:
+    """Draw a surface, smooth but for its creases."""
+    import pyvista
 
-    Parameters
-    ----------
-    plotter
-        Draws into its current panel.
-    surface
-        What to draw.
-    pixels
-        Pixels per model unit; the smaller the triangles, the thinner and paler their edges.
+    mesh = pyvista.PolyData.from_regular_faces(surface.points, surface.faces)
+    look: dict[str, Any] = {"color": GREY, **_GREY_MATERIAL}
+    if colouring is not None:
+        mesh.cell_data["rgb"] = colouring.rgb()
+        look = {"scalars": "rgb", "rgb": True, **_COLOUR_MATERIAL}
+    plotter.add_mesh(mesh, **look, **edges, **_SHADING)
+
+
+def _edges(surface: Surface, view: View, size: tuple[int, int], scale: float) -> dict[str, Any]:
+    style = edge_style(surface, view, size, scale)
+    if style is None:
+        return {"show_edges": False}
+    return {"show_edges": True, "edge_color": INK, "line_width": style.width, "edge_opacity": style.opacity}
+
+
+def _draw_cells(plotter: Any, cells: Cells, view: View, scale: float) -> None:
+    """Draw polygons in pale colours, one per cell, and lines between the cells.
+
+    The lines are moved a little towards the viewer, which a parallel projection does not show, so that they lie on
+    the polygons.
     """
-    style = {"color": GREY, "smooth_shading": True, "split_sharp_edges": True, "feature_angle": 30.0}
-    plotter.add_mesh(_mesh(surface), **style, **_edges(surface, pixels), ambient=0.25, diffuse=0.75, specular=0.0)
-
-
-def draw_values(
-    plotter: Any, surface: Surface, values: npt.NDArray[Any], *, name: str, bar: bool, pixels: float
-) -> None:
-    """Draw a surface coloured by a value per face, up to the 99 % quantile, with or without a colour bar."""
-    finite = values[np.isfinite(values)]
-    low, high = (float(finite.min()), float(np.quantile(finite, 0.99))) if len(finite) else (0.0, 1.0)
-    mesh = _mesh(surface)
-    mesh.cell_data[name] = np.clip(values, low, high)
-    plotter.add_mesh(
-        mesh,
-        scalars=name,
-        cmap="YlOrRd",
-        clim=(low, max(high, low + 1e-3 * (abs(low) or 1.0))),
-        show_scalar_bar=bar,
-        scalar_bar_args=BAR | {"title": name},
-        **_edges(surface, pixels),
-        ambient=0.4,
-        diffuse=0.6,
-    )
-
-
-def draw_cells(plotter: Any, cells: Cells) -> None:
-    """Draw polygons in pale colours, one per cell."""
     import pyvista
 
     mesh = pyvista.PolyData()
@@ -106,32 +114,11 @@ def draw_cells(plotter: Any, cells: Cells) -> None:
     mesh.SetPolys(pyvista.CellArray.from_arrays(cells.offsets, cells.corners))
     palette = np.random.default_rng(0).permutation(64) / 64
     mesh.cell_data["cell"] = palette[np.asarray(cells.labels) % 64]
-    plotter.add_mesh(mesh, scalars="cell", cmap="Pastel1", show_scalar_bar=False, ambient=0.3, diffuse=0.7)
-
-
-def draw_frame(plotter: Any, view: View, aspect: float, reach: float) -> None:
-    """Mark what the close-up shows; the projection is parallel, so the frame can float before the surface."""
-    import pyvista
-
-    right, up, towards = view.axes
-    signs = np.array([[-1, -1], [1, -1], [1, 1], [-1, 1], [-1, -1]])
-    offsets = signs * view.half_height * np.array([aspect, 1.0])
-    corners = view.centre + offsets @ np.stack([right, up]) + reach * towards
-    plotter.add_mesh(pyvista.MultipleLines(corners), color=ACCENT, line_width=3.0, lighting=False)
-    plotter.renderer.ResetCameraClippingRange()
-
-
-def _mesh(surface: Surface) -> Any:
-    import pyvista
-
-    return pyvista.PolyData.from_regular_faces(surface.points, surface.faces)
-
-
-def _edges(surface: Surface, pixels: float) -> dict[str, Any]:
-    side = pixels * np.sqrt(surface.area / surface.n_faces)
-    return {
-        "show_edges": True,
-        "edge_color": INK,
-        "line_width": float(np.clip(side / 12.0, 0.6, 1.3)),
-        "edge_opacity": float(np.clip(side / 14.0, 0.25, 0.9)),
-    }
+    mesh = mesh.clean(tolerance=1e-7)
+    plotter.add_mesh(mesh, scalars="cell", cmap="Pastel1", show_scalar_bar=False, **_SHADING, **_COLOUR_MATERIAL)
+    sides = cells.outlines()
+    if len(sides):
+        lines = pyvista.PolyData()
+        lines.points = cells.points + _LIFT * view.half_height * view.axes[2]
+        lines.SetLines(pyvista.CellArray.from_regular_cells(sides.astype(int)))
+        plotter.add_mesh(lines, color=INK, line_width=1.2 * scale, opacity=0.7, lighting=False)

@@ -25,15 +25,16 @@ def require_renderer() -> None:
     Raises
     ------
     AnisomeshError
-        If pyvista is not installed, or if neither a display, EGL nor OSMesa can be used.
+        If pyvista or matplotlib is not installed, or if neither a display, EGL nor OSMesa can be used.
 
     Notes
     -----
     VTK ends the process when no OpenGL library works, so the check draws an empty window in another process;
     this takes about half a second, once per process.
     """
-    if importlib.util.find_spec("pyvista") is None:
-        raise AnisomeshError('pictures need pyvista, which is not installed; run: pip install "anisomesh[picture]"')
+    for name in ("pyvista", "matplotlib"):
+        if importlib.util.find_spec(name) is None:
+            raise AnisomeshError(f'pictures need {name}, which is not installed; run: pip install "anisomesh[picture]"')
     if not _can_render():
         raise AnisomeshError(
             "pictures need OpenGL and VTK found none that works here; install EGL (Debian: libegl1) "

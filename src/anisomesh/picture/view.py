@@ -1,36 +1,16 @@
-"""Where to look from: a view of everything and a close-up of the most stretched triangles."""
+"""Where to look: a view of everything and a close-up of the most stretched triangles."""
 
 from __future__ import annotations
-
-from dataclasses import dataclass
 
 import numpy as np
 from scipy.spatial import cKDTree
 
 from anisomesh._arrays import FaceScalars, Points, Vector3
+from anisomesh.picture.camera import View, camera_axes, framed
 from anisomesh.surface.mesh import Surface
 
 _FACES_IN_CLOSEUP = 150
 _CANDIDATES = 400
-
-
-@dataclass(frozen=True, kw_only=True)
-class View:
-    """A parallel projection.
-
-    Parameters
-    ----------
-    centre
-        The point in the middle of the picture, model units.
-    axes
-        Rows: to the right, up, and towards the viewer; orthonormal (3, 3).
-    half_height
-        Half the height of what is in view, model units.
-    """
-
-    centre: Vector3
-    axes: Points
-    half_height: float
 
 
 def triangle_stretch(surface: Surface) -> FaceScalars:
@@ -59,18 +39,7 @@ def whole_view(points: Points, aspect: float) -> View:
     aspect
         Width of the picture divided by its height.
     """
-    axis = int(np.argmin(np.ptp(points, axis=0)))
-    front = np.eye(3)[axis] * (-1.0 if axis == 1 else 1.0)
-    above = np.eye(3)[1 if axis == 2 else 2]
-    towards = front + 0.45 * np.cross(above, front) + 0.4 * above
-    right = np.cross(above, towards)
-    axes = np.stack([right, np.cross(towards, right), towards])
-    axes /= np.linalg.norm(axes, axis=1, keepdims=True)
-    projected = points @ axes.T
-    low, high = projected.min(axis=0), projected.max(axis=0)
-    half = 0.5 * (high - low)
-    half_height = 1.12 * float(max(half[1], half[0] / aspect)) or 1.0
-    return View(centre=0.5 * (low + high) @ axes, axes=axes, half_height=half_height)
+    return framed(points, camera_axes(points), aspect)
 
 
 def closeup(surface: Surface, view: View, aspect: float) -> View:

@@ -169,7 +169,7 @@ SAMPLES: dict[str, Callable[[], Surface]] = {
 
 
 def sample(name: str = DEFAULT_SAMPLE) -> Surface:
-    """Return a sample by its name in :data:`SAMPLES`; the default is a twisted ring with four sharp edges.
+    """Return a sample by its name in :data:`SAMPLES`; the default is a machine part.
 
     Raises
     ------

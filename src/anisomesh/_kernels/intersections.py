@@ -1,0 +1,375 @@
+"""Which triangles intersect: a tree of boxes to find candidates, exact orientations to decide.
+
+A face is a row of three indices into points without two alike, so faces share a point where they share an index.
+Every decision is the sign of an orientation determinant, in floating point where its error bound permits (Shewchuk
+1997) and else in exact arithmetic. All products of three coordinates and their rounding errors must be doubles that
+are not subnormal.
+
+Triangles whose planes differ are compared by the sides of these planes that their corners lie on, and by how their
+edges pass the edges of the other (Guigue and Devillers 2003); triangles in one plane after dropping a coordinate.
+
+The tree is complete: node m of level l holds the faces from ``n m >> l`` to ``n (m + 1) >> l`` of the n in its order,
+and stands at place ``2**l - 1 + m``.
+"""
+
+import numpy as np
+
+from .compiled import allocating, inlined, kernel
+from .predicates import _add_determinant, _add_product, sign_of_sum
+
+_UNIT_ROUNDOFF = 1.1102230246251565e-16
+_ERROR_2D = (3.0 + 16.0 * _UNIT_ROUNDOFF) * _UNIT_ROUNDOFF
+_ERROR_3D = (7.0 + 56.0 * _UNIT_ROUNDOFF) * _UNIT_ROUNDOFF
+
+
+@allocating
+def _exact_orient2d(points, x, y, a, b, c):
+    terms = np.empty(12)
+    n = 0
+    for p, q in ((a, b), (b, c), (c, a)):
+        n = _add_product(terms, n, points[p, x], points[q, y], 1.0)
+        n = _add_product(terms, n, points[p, y], points[q, x], -1.0)
+    return sign_of_sum(terms, n)
+
+
+@allocating
+def _exact_orient3d(points, a, b, c, d):
+    rows = np.empty((3, 3))
+    rounded = False
+    for k, p in enumerate((a, b, c)):
+        for x in range(3):
+            difference = points[p, x] - points[d, x]
+            part = points[p, x] - difference
+            error = (points[p, x] - (difference + part)) + (part - points[d, x])
+            rows[k, x] = difference
+            rounded = rounded or error != 0.0
+    terms = np.empty(96)
+    if not rounded:
+        return sign_of_sum(terms, _add_determinant(terms, 0, rows[0], rows[1], rows[2], 1.0))
+    n = _add_determinant(terms, 0, points[a], points[b], points[c], 1.0)
+    n = _add_determinant(terms, n, points[d], points[b], points[c], -1.0)
+    n = _add_determinant(terms, n, points[a], points[d], points[c], -1.0)
+    n = _add_determinant(terms, n, points[a], points[b], points[d], -1.0)
+    return sign_of_sum(terms, n)
+
+
+@kernel
+def orient2d(points, axis, a, b, c):
+    """Return the exact sign of the area of the triangle a b c seen along an axis, 1 if counter-clockwise."""
+    x = (axis + 1) % 3
+    y = (axis + 2) % 3
+    left = (points[a, x] - points[c, x]) * (points[b, y] - points[c, y])
+    right = (points[a, y] - points[c, y]) * (points[b, x] - points[c, x])
+    area = left - right
+    size = abs(left) + abs(right)
+    if abs(area) > _ERROR_2D * size:
+        return 1 if area > 0.0 else -1
+    if size == 0.0:
+        return 0
+    return _exact_orient2d(points, x, y, a, b, c)
+
+
+@kernel
+def orient3d(points, a, b, c, d):
+    """Return the exact sign of the determinant of a - d, b - d, c - d; it alternates in the four points."""
+    ax = points[a, 0] - points[d, 0]
+    ay = points[a, 1] - points[d, 1]
+    az = points[a, 2] - points[d, 2]
+    bx = points[b, 0] - points[d, 0]
+    by = points[b, 1] - points[d, 1]
+    bz = points[b, 2] - points[d, 2]
+    cx = points[c, 0] - points[d, 0]
+    cy = points[c, 1] - points[d, 1]
+    cz = points[c, 2] - points[d, 2]
+    bc = bx * cy
+    cb = cx * by
+    ca = cx * ay
+    ac = ax * cy
+    ab = ax * by
+    ba = bx * ay
+    volume = az * (bc - cb) + bz * (ca - ac) + cz * (ab - ba)
+    size = (abs(bc) + abs(cb)) * abs(az) + (abs(ca) + abs(ac)) * abs(bz) + (abs(ab) + abs(ba)) * abs(cz)
+    if abs(volume) > _ERROR_3D * size:
+        return 1 if volume > 0.0 else -1
+    if size == 0.0:  # every product has a factor of zero: a difference of equal coordinates
+        return 0
+    return _exact_orient3d(points, a, b, c, d)
+
+
+@kernel
+def choose_axes(points, faces, axes):
+    """Write for each face an axis (F,) along which it is seen with an area, -1 for a face without area."""
+    for f in range(len(faces)):
+        a = faces[f, 0]
+        b = faces[f, 1]
+        c = faces[f, 2]
+        widest = 0
+        largest = -1.0
+        for axis in range(3):
+            x = (axis + 1) % 3
+            y = (axis + 2) % 3
+            area = (points[a, x] - points[c, x]) * (points[b, y] - points[c, y])
+            area -= (points[a, y] - points[c, y]) * (points[b, x] - points[c, x])
+            if abs(area) > largest:
+                widest = axis
+                largest = abs(area)
+        axes[f] = -1
+        for k in range(3):
+            axis = (widest + k) % 3
+            if orient2d(points, axis, a, b, c) != 0:
+                axes[f] = axis
+                break
+
+
+@kernel
+def _outside_an_edge(points, axis, a, b, c, p, q, r):
+    """Return whether, seen along the axis, p, q and r lie strictly outside one of the edges of the triangle a b c."""
+    inside = orient2d(points, axis, a, b, c)
+    for _ in range(3):
+        if (
+            orient2d(points, axis, a, b, p) * inside < 0
+            and orient2d(points, axis, a, b, q) * inside < 0
+            and orient2d(points, axis, a, b, r) * inside < 0
+        ):
+            return True
+        a, b, c = b, c, a
+    return False
+
+
+@kernel
+def _within_wedge(points, axis, v, p, q, r):
+    """Return whether, seen along the axis, the closed wedge at v from p to q, less than a half-plane, holds r."""
+    turn = orient2d(points, axis, v, p, q)
+    return orient2d(points, axis, v, p, r) * turn >= 0 and orient2d(points, axis, v, r, q) * turn >= 0
+
+
+@kernel
+def _passes(points, u, v, side_u, side_v, x, y, z):
+    """Return whether the segment u v meets the triangle x y z, not in its plane; given the sides of that plane."""
+    if side_u * side_v > 0 or (side_u == 0 and side_v == 0):
+        return False
+    xy = orient3d(points, u, v, x, y)
+    yz = orient3d(points, u, v, y, z)
+    if xy * yz < 0:
+        return False
+    zx = orient3d(points, u, v, z, x)
+    return xy * zx >= 0 and yz * zx >= 0
+
+
+@kernel
+def _disjoint_meet(points, axis, a, b, c, p, q, r):
+    """Return whether two triangles without a common corner meet; the axis is that of the first one.
+
+    In one plane, triangles are apart if and only if an edge of one has the other outside (their Minkowski difference
+    is convex, its edges are parallel to theirs). In different planes they meet along a part of the line of the two
+    planes; an end of it is on an edge of one that passes the other or, where that edge lies in the plane of the
+    other, on an edge next to it that does not.
+    """
+    side_a = orient3d(points, p, q, r, a)
+    side_b = orient3d(points, p, q, r, b)
+    side_c = orient3d(points, p, q, r, c)
+    if side_a == side_b and side_b == side_c:
+        if side_a != 0:
+            return False
+        return not (
+            _outside_an_edge(points, axis, a, b, c, p, q, r) or _outside_an_edge(points, axis, p, q, r, a, b, c)
+        )
+    side_p = orient3d(points, a, b, c, p)
+    side_q = orient3d(points, a, b, c, q)
+    side_r = orient3d(points, a, b, c, r)
+    if side_p == side_q and side_q == side_r:
+        return False
+    return (
+        _passes(points, a, b, side_a, side_b, p, q, r)
+        or _passes(points, b, c, side_b, side_c, p, q, r)
+        or _passes(points, c, a, side_c, side_a, p, q, r)
+        or _passes(points, p, q, side_p, side_q, a, b, c)
+        or _passes(points, q, r, side_q, side_r, a, b, c)
+        or _passes(points, r, p, side_r, side_p, a, b, c)
+    )
+
+
+@kernel
+def _meet_beside_corner(points, axis, v, p, q, r, s):
+    """Return whether triangles v p q and v r s meet in more than v; the axis is that of the first one.
+
+    If they meet in another point, they meet along the ray to it from v until it leaves one of them: then p q meets
+    the triangle v r s, or r s the triangle v p q. In one plane, an edge at v of one is within the wedge of the other.
+    """
+    side_p = orient3d(points, v, r, s, p)
+    side_q = orient3d(points, v, r, s, q)
+    if side_p * side_q > 0:
+        return False
+    if side_p == 0 and side_q == 0:
+        return (
+            _within_wedge(points, axis, v, p, q, r)
+            or _within_wedge(points, axis, v, p, q, s)
+            or _within_wedge(points, axis, v, r, s, p)
+            or _within_wedge(points, axis, v, r, s, q)
+        )
+    side_r = orient3d(points, v, p, q, r)
+    side_s = orient3d(points, v, p, q, s)
+    if side_r * side_s > 0:
+        return False
+    # the line p q passes v r and s v as side_r and -side_s tell, and the line r s passes v p and q v likewise
+    passing = orient3d(points, p, q, r, s)
+    return passing * (side_r - side_s) >= 0 or passing * (side_p - side_q) >= 0
+
+
+@kernel
+def faces_intersect(points, faces, axes, i, j):
+    """Return whether faces i and j, which have an area, meet in more than the corners and the edge they share."""
+    shared = 0
+    sum_i = 0
+    sum_j = 0
+    for k in range(3):
+        for m in range(3):
+            if faces[i, k] == faces[j, m]:
+                shared += 1
+                sum_i += k
+                sum_j += m
+    if shared == 0:
+        return _disjoint_meet(
+            points, axes[i], faces[i, 0], faces[i, 1], faces[i, 2], faces[j, 0], faces[j, 1], faces[j, 2]
+        )
+    if shared == 1:
+        return _meet_beside_corner(
+            points,
+            axes[i],
+            faces[i, sum_i],
+            faces[i, (sum_i + 1) % 3],
+            faces[i, (sum_i + 2) % 3],
+            faces[j, (sum_j + 1) % 3],
+            faces[j, (sum_j + 2) % 3],
+        )
+    if shared == 2:
+        apex = 3 - sum_i
+        a = faces[i, apex]
+        b = faces[i, (apex + 1) % 3]
+        c = faces[i, (apex + 2) % 3]
+        other = faces[j, 3 - sum_j]
+        if orient3d(points, a, b, c, other) != 0:
+            return False
+        return orient2d(points, axes[i], b, c, a) == orient2d(points, axes[i], b, c, other)
+    return True
+
+
+@inlined
+def _select(keys, axis, order, first, last, middle):
+    """Partition ``order[first:last]`` by the keys of one axis about the one whose rank is ``middle``."""
+    low = first
+    high = last - 1
+    while low < high:
+        pivot = keys[order[(low + high) >> 1], axis]
+        up = low
+        down = high
+        while up <= down:
+            while keys[order[up], axis] < pivot:
+                up += 1
+            while keys[order[down], axis] > pivot:
+                down -= 1
+            if up <= down:
+                order[up], order[down] = order[down], order[up]
+                up += 1
+                down -= 1
+        if middle <= down:
+            high = down
+        elif middle >= up:
+            low = up
+        else:
+            break
+
+
+@kernel
+def sort_into_tree(centres, order, depth):
+    """Permute ``order`` (n,) so that every node of the tree halves its centres (n, 3) along the axis of most spread."""
+    n = len(order)
+    for level in range(depth):
+        for node in range(1 << level):
+            first = (n * node) >> level
+            last = (n * (node + 1)) >> level
+            axis = 0
+            widest = -1.0
+            for x in range(3):
+                low = np.inf
+                high = -np.inf
+                for k in range(first, last):
+                    low = min(low, centres[order[k], x])
+                    high = max(high, centres[order[k], x])
+                if high - low > widest:
+                    axis = x
+                    widest = high - low
+            _select(centres, axis, order, first, last, (n * (2 * node + 1)) >> (level + 1))
+
+
+@inlined
+def _overlap(boxes, i, others, j):
+    """Return whether two closed boxes, each a row of lower and upper bounds, have a point in common."""
+    return (
+        boxes[i, 0] <= others[j, 3]
+        and others[j, 0] <= boxes[i, 3]
+        and boxes[i, 1] <= others[j, 4]
+        and others[j, 1] <= boxes[i, 4]
+        and boxes[i, 2] <= others[j, 5]
+        and others[j, 2] <= boxes[i, 5]
+    )
+
+
+@inlined
+def _beside(points, faces, i, slabs, j):
+    """Return whether face i lies outside the slab of face j, which is a direction, a lower and an upper bound."""
+    least = np.inf
+    most = -np.inf
+    for c in range(3):
+        p = faces[i, c]
+        height = points[p, 0] * slabs[j, 0] + points[p, 1] * slabs[j, 1] + points[p, 2] * slabs[j, 2]
+        least = min(least, height)
+        most = max(most, height)
+    return least > slabs[j, 4] or most < slabs[j, 3]
+
+
+@kernel
+def find_pairs(begin, points, faces, axes, boxes, slabs, nodes, depth, stack, pairs):
+    """Write the pairs of faces that intersect as rows of ``pairs``, from face ``begin`` on, as long as there is room.
+
+    Faces (F, 3), axes (F,), boxes (F, 6) and slabs (F, 5) are in the order of the tree, ``nodes`` are its boxes. Every
+    pair is found from the face that comes first. ``stack`` (depth + 2, 2) is a workspace.
+
+    Returns
+    -------
+    tuple
+        The face to go on from, F at the end, and the number of pairs written. With room for F pairs at least one
+        face is dealt with.
+    """
+    n = len(faces)
+    written = 0
+    for face in range(begin, n):
+        before = written
+        stack[0, 0] = 0
+        stack[0, 1] = 0
+        height = 1
+        while height > 0:
+            height -= 1
+            level = stack[height, 0]
+            node = stack[height, 1]
+            last = (n * (node + 1)) >> level
+            if last <= face + 1 or not _overlap(boxes, face, nodes, (1 << level) - 1 + node):
+                continue
+            if level < depth:
+                for child in range(2 * node, 2 * node + 2):
+                    stack[height, 0] = level + 1
+                    stack[height, 1] = child
+                    height += 1
+                continue
+            for other in range(max((n * node) >> level, face + 1), last):
+                if (
+                    _overlap(boxes, face, boxes, other)
+                    and not _beside(points, faces, other, slabs, face)
+                    and faces_intersect(points, faces, axes, face, other)
+                ):
+                    if written == len(pairs):
+                        return face, before
+                    pairs[written, 0] = face
+                    pairs[written, 1] = other
+                    written += 1
+    return n, written

@@ -1,0 +1,1 @@
+"""Suites of remeshes that are run, measured, resumed and put into tables."""

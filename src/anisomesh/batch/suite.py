@@ -1,0 +1,149 @@
+"""What a suite of runs is: a TOML file that names meshes, ratios, methods and seeds."""
+
+from __future__ import annotations
+
+import difflib
+import tomllib
+from dataclasses import dataclass, field
+from importlib import resources
+from pathlib import Path
+from typing import Any
+
+from anisomesh.batch.methods import METHODS
+from anisomesh.errors import OptionError
+
+_KEYS = {"description", "meshes", "shapes", "closed", "ratios", "seeds", "samples", "methods"}
+_METHOD_KEYS = {"name", "method", "options"}
+
+
+@dataclass(frozen=True, kw_only=True)
+class Method:
+    """A way to remesh: the name of its row, which method, and the options that it takes."""
+
+    name: str
+    method: str
+    options: dict[str, Any] = field(default_factory=dict)
+
+
+@dataclass(frozen=True, kw_only=True)
+class Suite:
+    """Runs of every method on every mesh at every ratio with every seed.
+
+    Attributes
+    ----------
+    name, description
+        What the suite is called and what it shows.
+    meshes
+        Patterns of mesh files, relative to the data folder.
+    shapes
+        Meshes made by code, ``name:size``, see :func:`anisomesh.batch.inputs.make_shape`.
+    closed
+        Whether meshes with a boundary are left out.
+    ratios
+        Vertices of the results per vertex of the prepared input.
+    seeds
+        Seeds of the methods that have one.
+    samples
+        Points on each surface that the results are measured with.
+    methods
+        The methods.
+    """
+
+    name: str
+    description: str
+    meshes: tuple[str, ...] = ()
+    shapes: tuple[str, ...] = ()
+    closed: bool = False
+    ratios: tuple[float, ...] = (1.0,)
+    seeds: tuple[int, ...] = (0,)
+    samples: int = 100_000
+    methods: tuple[Method, ...]
+
+
+def shipped_suites() -> list[str]:
+    """Return the names of the suites that come with the package."""
+    folder = resources.files("anisomesh.batch") / "suites"
+    return sorted(entry.name.removesuffix(".toml") for entry in folder.iterdir() if entry.name.endswith(".toml"))
+
+
+def load_suite(name: str) -> Suite:
+    """Return a suite by the name of a shipped one or the path of a TOML file.
+
+    Raises
+    ------
+    OptionError
+        If there is no such suite, or the file has an error; the message says where, and what was meant.
+    """
+    if name in shipped_suites():
+        text = (resources.files("anisomesh.batch") / "suites" / f"{name}.toml").read_text(encoding="utf-8")
+    elif name.endswith(".toml") and Path(name).is_file():
+        text = Path(name).read_text(encoding="utf-8")
+    else:
+        hint = _hint(name, shipped_suites())
+        raise OptionError(
+            f"there is no suite {name!r}{hint}; expected one of {', '.join(shipped_suites())}, or a .toml file"
+        )
+    try:
+        return parse_suite(Path(name).stem, tomllib.loads(text))
+    except tomllib.TOMLDecodeError as error:
+        raise OptionError(f"{name} is not valid TOML: {error}") from error
+
+
+def parse_suite(name: str, table: dict[str, Any]) -> Suite:
+    """Return the suite that a table of a TOML file describes, checked key by key.
+
+    Raises
+    ------
+    OptionError
+        If a key or method is unknown, missing, or has a value of the wrong kind.
+    """
+    _check_keys(name, table, _KEYS)
+    methods = tuple(_method(name, entry) for entry in _list(name, table, "methods", dict))
+    if not methods:
+        raise OptionError(f"{name}: there is no method; add a [[methods]] table with name and method")
+    if len({method.name for method in methods}) < len(methods):
+        raise OptionError(f"{name}: two methods have the same name; give each its own")
+    suite = Suite(
+        name=name,
+        description=str(table.get("description", "")),
+        meshes=tuple(_list(name, table, "meshes", str)),
+        shapes=tuple(_list(name, table, "shapes", str)),
+        closed=bool(table.get("closed", False)),
+        ratios=tuple(float(ratio) for ratio in _list(name, table, "ratios", int | float)) or (1.0,),
+        seeds=tuple(_list(name, table, "seeds", int)) or (0,),
+        samples=int(table.get("samples", 100_000)),
+        methods=methods,
+    )
+    if not suite.meshes and not suite.shapes:
+        raise OptionError(f"{name}: there is no mesh; name files in meshes = [...] or shapes in shapes = [...]")
+    if min(suite.ratios) <= 0.0 or suite.samples < 1:
+        raise OptionError(f"{name}: ratios and samples must be positive")
+    return suite
+
+
+def _method(suite: str, entry: dict[str, Any]) -> Method:
+    _check_keys(f"{suite}: method {entry.get('name', '?')!r}", entry, _METHOD_KEYS)
+    method = entry.get("method", "")
+    if method not in METHODS:
+        raise OptionError(
+            f"{suite}: method {method!r} is unknown{_hint(method, list(METHODS))}; expected one of {', '.join(METHODS)}"
+        )
+    return Method(name=str(entry.get("name", method)), method=method, options=dict(entry.get("options", {})))
+
+
+def _list(suite: str, table: dict[str, Any], key: str, kind: Any) -> list[Any]:
+    values = table.get(key, [])
+    if not isinstance(values, list) or not all(isinstance(value, kind) for value in values):
+        raise OptionError(f"{suite}: {key} = {values!r}; expected a list")
+    return values
+
+
+def _check_keys(where: str, table: dict[str, Any], known: set[str]) -> None:
+    for key in table:
+        if key not in known:
+            raise OptionError(f"{where}: unknown key {key!r}{_hint(key, sorted(known))}")
+
+
+def _hint(word: str, known: list[str]) -> str:
+    close = difflib.get_close_matches(word, known, 1)
+    return f" (did you mean {close[0]!r}?)" if close else ""

@@ -1,0 +1,59 @@
+"""``anisomesh benchmark``: run a suite, go on where it was, write rows and reports."""
+
+from __future__ import annotations
+
+import sys
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
+
+import typer
+
+if TYPE_CHECKING:
+    from anisomesh.batch.runs import Progress
+
+
+def command(
+    suite: Annotated[
+        str | None, typer.Argument(metavar="SUITE", help="Name of a suite that comes with anisomesh, or a .toml file.")
+    ] = None,
+    out: Annotated[Path, typer.Option("--out", "-o", help="Folder for rows and reports.")] = Path("benchmark"),
+    data: Annotated[
+        Path | None,
+        typer.Option(envvar="ANISOMESH_DATA", help="Folder that the mesh patterns of the suite refer to."),
+    ] = None,
+    show_list: Annotated[bool, typer.Option("--list", help="List the suites and exit.")] = False,
+    quiet: Annotated[bool, typer.Option("--quiet", "-q", help="No progress.")] = False,
+) -> None:
+    """Run a SUITE of methods on meshes; a run that was stopped goes on where it was."""
+    from anisomesh.batch.suite import load_suite, shipped_suites
+
+    if show_list:
+        for name in shipped_suites():
+            typer.echo(f"{name:<18} {load_suite(name).description.strip().splitlines()[0]}")
+        return
+    if suite is None:
+        raise typer.BadParameter("name a suite, or list them with --list")
+    wanted = load_suite(suite)
+    from anisomesh.batch.runs import run_suite
+    from anisomesh.batch.tables import markdown, web_page
+    from anisomesh.surface.files import atomic_path
+
+    out.mkdir(parents=True, exist_ok=True)
+    stem = out / wanted.name
+    rows = run_suite(wanted, stem.with_suffix(".jsonl"), data=data, on_row=lambda step: None if quiet else _print(step))
+    for suffix, text in ((".md", markdown(wanted, rows)), (".html", web_page(wanted, rows))):
+        with atomic_path(stem.with_suffix(suffix)) as temporary:
+            Path(temporary).write_text(text, encoding="utf-8")
+    typer.echo(f"{len(rows):,} runs; wrote " + ", ".join(f"{stem}{suffix}" for suffix in (".jsonl", ".md", ".html")))
+
+
+def _print(step: Progress) -> None:
+    row = step.row
+    name = f"{Path(row['mesh']).name[:32]:<32} {row['ratio']:>4.0%} {row['method']:<20}"
+    if row["status"] == "done":
+        found = row["evaluation"]
+        said = f"G {found['shape']['g_mean']:.3f} RMS {found['distance']['rms']:.2e} {row['seconds']:.2f} s"
+    else:
+        said = f"{row['status']}: {row['error']}"
+    left = f"{step.seconds_left / 60:.0f} min left" if step.seconds_left >= 60 else f"{step.seconds_left:.0f} s left"
+    print(f"[{step.number}/{step.total}] {name} {said} ({left})", file=sys.stderr, flush=True)

@@ -1,0 +1,137 @@
+"""``anisomesh figure gallery`` and ``strip``: many meshes in a grid, one mesh at several resolutions."""
+
+from __future__ import annotations
+
+import math
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any
+
+import typer
+from typer.core import TyperCommand
+
+from anisomesh.cli.arguments import (
+    FinalSharpness,
+    Metric,
+    MetricName,
+    Quiet,
+    Seed,
+    Sharpness,
+    Source,
+    Threads,
+    remesh_options,
+)
+from anisomesh.cli.figure_options import Direction, Out, Scale, Up, camera, check_file, conclude, size
+from anisomesh.cli.job import read, run_remesh
+from anisomesh.cli.progress import progress
+from anisomesh.cli.report import counted
+
+if TYPE_CHECKING:
+    from anisomesh.surface.mesh import Surface
+
+RATIOS = "1 0.6 0.2 0.1"
+
+
+def gallery(
+    sources: Annotated[list[Path], typer.Argument(metavar="MESH...", help="Meshes to draw, row by row.")],
+    out: Out,
+    columns: Annotated[int | None, typer.Option(min=1, help="Meshes per row.")] = None,
+    same_view: Annotated[
+        bool, typer.Option("--same-view", help="One camera for all, as for versions of one shape.")
+    ] = False,
+    direction: Direction = None,
+    up: Up = None,
+    scale: Scale = 2,
+    quiet: Quiet = False,
+) -> None:
+    """Draw many meshes in a grid, with their names and numbers of vertices."""
+    from anisomesh.picture import Panel
+    from anisomesh.picture import gallery as draw
+
+    view = camera(direction, up)
+    check_file(out)
+    with progress(quiet) as display:
+        surfaces = [read(source)[0] for source in sources]
+        panels = [
+            Panel(surface=surface, name=source.stem, note=_vertices(surface))
+            for source, surface in zip(sources, surfaces, strict=True)
+        ]
+        display.note(f"drawing {out}")
+        draw(panels, out, columns=columns, same_view=same_view, scale=scale, **view)
+    conclude([(panel.name, size(panel.surface)) for panel in panels], out, quiet)
+
+
+class StripCommand(TyperCommand):
+    """A command whose ``--ratios`` takes all numbers that follow it."""
+
+    def parse_args(self, ctx: Any, args: list[str]) -> list[str]:
+        """Join the numbers after ``--ratios`` to one word, then parse as usual."""
+        words = list(args)
+        if "--ratios" in words:
+            first = words.index("--ratios") + 1
+            last = first
+            while last < len(words) and _is_number(words[last]):
+                last += 1
+            if last > first:
+                words[first:last] = [" ".join(words[first:last])]
+        return super().parse_args(ctx, words)
+
+
+def strip(
+    source: Source,
+    out: Out,
+    ratios: Annotated[
+        str, typer.Option("--ratios", metavar="R [R ...]", help="Vertices of each result per vertex of the input.")
+    ] = RATIOS,
+    metric: MetricName = Metric.curvature,
+    sharpness: Sharpness = 7.0,
+    final_sharpness: FinalSharpness = None,
+    seed: Seed = 0,
+    threads: Threads = 2,
+    direction: Direction = None,
+    up: Up = None,
+    scale: Scale = 2,
+    quiet: Quiet = False,
+) -> None:
+    """Remesh IN at several numbers of vertices and draw the results in a row, seen from the same side."""
+    from anisomesh.picture import Panel
+    from anisomesh.picture import gallery as draw
+
+    wanted = _parsed(ratios)
+    view = camera(direction, up)
+    check_file(out)
+    options = remesh_options(metric, sharpness, final_sharpness, seed, threads)
+    panels, rows = [], []
+    with progress(quiet) as display:
+        surface, seconds = read(source)
+        for ratio in wanted:
+            display.note(f"remeshing at {100 * ratio:g} % of the vertices")
+            result, facts = run_remesh(surface, display, name=str(source), load_seconds=seconds, ratio=ratio, **options)
+            panels.append(Panel(surface=result.surface, name=f"{100 * ratio:g} %", note=_vertices(result.surface)))
+            rows.append((panels[-1].name, size(result.surface)))
+            rows += [("warning", text) for text in facts["warnings"]]
+        display.note(f"drawing {out}")
+        draw(panels, out, columns=len(panels), same_view=True, scale=scale, **view)
+    conclude(rows, out, quiet)
+
+
+def _vertices(surface: Surface) -> str:
+    return counted(surface.n_points, "vertex", "vertices")
+
+
+def _is_number(word: str) -> bool:
+    try:
+        float(word)
+    except ValueError:
+        return False
+    return True
+
+
+def _parsed(ratios: str) -> list[float]:
+    """Return the numbers in a text, separated by spaces or commas."""
+    words = ratios.replace(",", " ").split()
+    for word in words:
+        if not (_is_number(word) and math.isfinite(float(word)) and float(word) > 0.0):
+            raise typer.BadParameter(f"--ratios: {word} is not a positive finite number")
+    if not words:
+        raise typer.BadParameter("--ratios: expected at least one number")
+    return [float(word) for word in words]

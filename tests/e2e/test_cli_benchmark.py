@@ -1,0 +1,145 @@
+"""``anisomesh benchmark``: rows, reports, going on after an end of any kind, failures as rows."""
+
+import json
+import os
+import signal
+import subprocess
+import sys
+import time
+
+import pytest
+
+from anisomesh.batch import methods
+from anisomesh.batch.runs import read_rows, run_suite
+from anisomesh.batch.suite import parse_suite
+from anisomesh.batch.tables import markdown, web_page
+from anisomesh.errors import AnisomeshError
+from anisomesh.surface.io import save
+from anisomesh.surface.mesh import Surface
+from anisomesh.surface.shapes import box, open_patch, sphere
+
+OURS = {"name": "ours", "method": "anisomesh", "options": {"max_iterations": 3}}
+TOML = """
+description = "two spheres"
+shapes = ["sphere:160", "sphere:640"]
+ratios = [0.5, 0.3]
+samples = 200
+methods = [{name = "ours", method = "anisomesh", options = {max_iterations = 3}}]
+"""
+
+
+def suite(**change):
+    return parse_suite("mine", {"shapes": ["sphere:100"], "ratios": [0.5], "samples": 200, "methods": [OURS], **change})
+
+
+def test_command_writes_rows_and_reports_and_goes_on(run_cli, tmp_path):
+    (tmp_path / "two.toml").write_text(TOML)
+    first = run_cli("benchmark", tmp_path / "two.toml", "-o", tmp_path / "out")
+    assert first.returncode == 0, first.stderr
+    assert "[4/4]" in first.stderr
+    rows = [json.loads(line) for line in (tmp_path / "out/two.jsonl").read_text().splitlines()]
+    assert [row["status"] for row in rows] == 4 * ["done"]
+    assert {row["asked"] for row in rows} == {max(4, round(r * n)) for r in (0.5, 0.3) for n in (162, 642)}
+    assert all(row["evaluation"]["validity"]["closed"] for row in rows)
+    page, text = (tmp_path / "out/two.html").read_text(), (tmp_path / "out/two.md").read_text()
+    assert "two spheres" in page
+    assert text.count("| ours |") >= 6
+    again = run_cli("benchmark", tmp_path / "two.toml", "-o", tmp_path / "out")
+    assert (again.returncode, again.stderr) == (0, "")
+    assert (tmp_path / "out/two.jsonl").read_text().splitlines() == [json.dumps(row) for row in rows]
+
+
+def test_a_killed_benchmark_goes_on(tmp_path):
+    (tmp_path / "two.toml").write_text(TOML)
+    rows = tmp_path / "out/two.jsonl"
+    words = ["benchmark", str(tmp_path / "two.toml"), "-o", str(tmp_path / "out")]
+    command = [sys.executable, "-c", "from anisomesh.cli.main import run; run()", *words]
+    process = subprocess.Popen(command, stderr=subprocess.DEVNULL, stdout=subprocess.DEVNULL)
+    deadline = time.monotonic() + 60
+    while not (rows.exists() and rows.read_bytes().count(b"\n") >= 1) and time.monotonic() < deadline:
+        time.sleep(0.005)
+    process.send_signal(signal.SIGKILL)
+    process.wait()
+    before = rows.read_text()
+    assert 1 <= before.count("\n") <= 4
+    rows.write_text(before + '{"mesh": "sphe')  # a row that was being written
+    done = subprocess.run(command, capture_output=True, text=True, timeout=120, check=True)
+    after = rows.read_text()
+    assert after.startswith(before)
+    assert len(read_rows(rows)) == 4
+    assert f"[{4 - before.count(chr(10))}/" in done.stderr or before.count("\n") == 4
+
+
+def test_other_options_are_run_again(tmp_path):
+    run_suite(suite(), tmp_path / "rows")
+    steps = []
+    run_suite(suite(), tmp_path / "rows", on_row=steps.append)
+    assert not steps
+    changed = {**OURS, "options": {"max_iterations": 4}}
+    rows = run_suite(suite(methods=[changed]), tmp_path / "rows", on_row=steps.append)
+    assert len(steps) == 1
+    assert rows[0]["options"]["max_iterations"] == 4
+    assert rows[0]["facts"]["iterations"] == 4
+
+
+def test_failures_and_missing_packages_are_rows(tmp_path, monkeypatch):
+    def broken(surface, n, seed, options):
+        raise ZeroDivisionError("no luck")
+
+    monkeypatch.setitem(methods.METHODS, "acvd", methods.Remesher(broken))
+    monkeypatch.setitem(methods.METHODS, "pymeshlab-quadric", methods.Remesher(broken, ("no_such_package",)))
+    three = suite(methods=[OURS, {"name": "broken", "method": "acvd"}, {"name": "away", "method": "pymeshlab-quadric"}])
+    rows = run_suite(three, tmp_path / "rows")
+    assert [row["status"] for row in rows] == ["done", "failed", "absent"]
+    assert rows[1]["error"] == "ZeroDivisionError: no luck"
+    assert rows[2]["error"] == "no_such_package not installed"
+    assert len(read_rows(tmp_path / "rows")) == 2  # what is absent now may be there next time
+    for report in (markdown(three, rows), web_page(three, rows)):
+        assert "no luck" in report
+        assert "away (no_such_package not installed)" in report
+
+
+def test_open_and_broken_meshes_are_rows(tmp_path):
+    folder = tmp_path / "data"
+    folder.mkdir()
+    save(box(n=3), folder / "a.ply")
+    save(open_patch(lambda x, y: x * y, n=4), folder / "b.ply")
+    (folder / "c.ply").write_text("ply\nformat ascii 1.0\nend_header\n")
+    rows = run_suite(suite(meshes=["*.ply"], shapes=[], closed=True), tmp_path / "rows", data=folder)
+    assert [(row["mesh"], row["status"]) for row in rows] == [
+        ("a.ply", "done"),
+        ("b.ply", "skipped"),
+        ("c.ply", "failed"),
+    ]
+    assert "c.ply" in rows[2]["error"]
+
+
+def test_a_foreign_file_of_rows_is_not_touched(tmp_path):
+    path = tmp_path / "rows"
+    path.write_text("not a row\n")
+    with pytest.raises(AnisomeshError, match="line 1: this is no row"):
+        run_suite(suite(), path)
+    assert path.read_text() == "not a row\n"
+
+
+@pytest.mark.parametrize("name", [name for name in methods.METHODS if name != "anisomesh"])
+def test_other_remeshers_give_about_the_vertices_asked_for(name):
+    remesher = methods.METHODS[name]
+    if remesher.missing:
+        pytest.skip(f"{', '.join(remesher.missing)} not installed")
+    surface = sphere(4)
+    produced = remesher.run(surface, 300, 0, {}).surface
+    assert isinstance(produced, Surface)
+    assert 200 < produced.n_points < 400
+
+
+def test_list_and_errors(run_cli, tmp_path):
+    assert "table1" in run_cli("benchmark", "--list").stdout
+    assert run_cli("benchmark").returncode == 2
+    environment = {key: "" for key in os.environ if key == "ANISOMESH_DATA"}
+    away = run_cli("benchmark", "table1", "-o", tmp_path, "--data", tmp_path, **environment)
+    assert away.returncode == 1
+    assert "has none of them" in away.stderr
+    unknown = run_cli("benchmark", "smok", "-o", tmp_path)
+    assert unknown.returncode == 1
+    assert "did you mean 'smoke'" in unknown.stderr

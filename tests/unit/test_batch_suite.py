@@ -1,0 +1,82 @@
+"""Suites: the shipped ones are right, errors in a file say where and what was meant."""
+
+import pytest
+
+from anisomesh.batch.inputs import inputs_of, make_shape
+from anisomesh.batch.suite import load_suite, parse_suite, shipped_suites
+from anisomesh.errors import OptionError
+from anisomesh.options import RemeshOptions
+
+TABLE = {"shapes": ["sphere:100"], "methods": [{"name": "ours", "method": "anisomesh"}]}
+
+
+@pytest.mark.parametrize("name", shipped_suites())
+def test_shipped_suites_load_and_their_shapes_and_options_exist(name):
+    suite = load_suite(name)
+    assert suite.name == name
+    assert suite.description
+    for shape in suite.shapes:
+        if not shape.endswith("000"):
+            assert make_shape(shape).n_points > 10
+    for method in suite.methods:
+        if method.method == "anisomesh":
+            RemeshOptions(**method.options)
+
+
+def test_all_suites_of_the_paper_are_there():
+    assert set(shipped_suites()) >= {"smoke", "table1", "rocker-fertility", "zeroshot", "torus", "timing"}
+
+
+@pytest.mark.parametrize(
+    ("change", "message"),
+    [
+        ({"ratio": [1.0]}, "did you mean 'ratios'"),
+        ({"ratios": 1.0}, "expected a list"),
+        ({"ratios": [0.0]}, "must be positive"),
+        ({"methods": []}, "no method"),
+        ({"shapes": []}, "no mesh"),
+        ({"methods": [{"name": "x", "method": "anisomeshh"}]}, "did you mean 'anisomesh'"),
+        ({"methods": [{"name": "x", "method": "acvd", "option": {}}]}, "did you mean 'options'"),
+        ({"methods": 2 * TABLE["methods"]}, "same name"),
+    ],
+)
+def test_errors_say_what_was_meant(change, message):
+    with pytest.raises(OptionError, match=message):
+        parse_suite("mine", {**TABLE, **change})
+
+
+def test_unknown_and_malformed_files(tmp_path):
+    with pytest.raises(OptionError, match="did you mean 'smoke'"):
+        load_suite("smokee")
+    (tmp_path / "bad.toml").write_text("ratios = [1.0")
+    with pytest.raises(OptionError, match="not valid TOML"):
+        load_suite(str(tmp_path / "bad.toml"))
+
+
+def test_meshes_that_are_not_there_are_named(tmp_path):
+    suite = parse_suite("mine", {**TABLE, "meshes": ["test/*.ply"]})
+    with pytest.raises(OptionError, match=r"needs the meshes test/\*\.ply; name their folder"):
+        inputs_of(suite, None)
+    with pytest.raises(OptionError, match="has none of them"):
+        inputs_of(suite, tmp_path)
+
+
+@pytest.mark.parametrize("spec", ["cube:100", "sphere", "sphere:x", "torus:1", "ring:-3", "ring:nan"])
+def test_wrong_shapes_are_refused(spec):
+    with pytest.raises(OptionError, match="expected one of"):
+        make_shape(spec)
+
+
+@pytest.mark.parametrize("spec", ["sphere:1000", "ring:2000", "part:3000"])
+def test_shapes_have_about_the_size_asked_for(spec):
+    wanted = float(spec.split(":")[1])
+    assert 0.4 * wanted < make_shape(spec).n_points < 2.5 * wanted
+
+
+@pytest.mark.parametrize("ratio", [2.0, 6.0, 11.0])
+def test_a_torus_has_the_stretch_in_its_name(ratio):
+    torus = make_shape(f"torus:{ratio:g}")
+    outer = torus.points[:, 0].max()
+    minor = torus.points[:, 2].max()
+    assert outer / minor == pytest.approx(ratio**2, rel=0.05)
+    assert 3_000 < torus.n_points < 9_000
