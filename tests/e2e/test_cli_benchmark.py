@@ -49,6 +49,14 @@ def test_command_writes_rows_and_reports_and_goes_on(run_cli, tmp_path):
     assert (tmp_path / "out/two.jsonl").read_text().splitlines() == [json.dumps(row) for row in rows]
 
 
+def test_one_ratio_of_a_suite(run_cli, tmp_path):
+    (tmp_path / "two.toml").write_text(TOML)
+    done = run_cli("benchmark", tmp_path / "two.toml", "-o", tmp_path, "--ratio", 0.3, "--quiet")
+    assert (done.returncode, done.stderr) == (0, "")
+    assert {row["ratio"] for row in read_rows(tmp_path / "two.jsonl")} == {0.3}
+    assert run_cli("benchmark", tmp_path / "two.toml", "-o", tmp_path, "--ratio", -1).returncode == 1
+
+
 def test_a_killed_benchmark_goes_on(tmp_path):
     (tmp_path / "two.toml").write_text(TOML)
     rows = tmp_path / "out/two.jsonl"

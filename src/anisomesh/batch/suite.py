@@ -59,6 +59,10 @@ class Suite:
     samples: int = 100_000
     methods: tuple[Method, ...]
 
+    def __post_init__(self) -> None:
+        if not min(self.ratios) > 0.0 or self.samples < 1:
+            raise OptionError(f"{self.name}: ratios and samples must be positive")
+
 
 def shipped_suites() -> list[str]:
     """Return the names of the suites that come with the package."""
@@ -116,8 +120,6 @@ def parse_suite(name: str, table: dict[str, Any]) -> Suite:
     )
     if not suite.meshes and not suite.shapes:
         raise OptionError(f"{name}: there is no mesh; name files in meshes = [...] or shapes in shapes = [...]")
-    if min(suite.ratios) <= 0.0 or suite.samples < 1:
-        raise OptionError(f"{name}: ratios and samples must be positive")
     return suite
 
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import sys
+from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
@@ -21,6 +22,10 @@ def command(
         Path | None,
         typer.Option(envvar="ANISOMESH_DATA", help="Folder that the mesh patterns of the suite refer to."),
     ] = None,
+    ratios: Annotated[
+        list[float] | None,
+        typer.Option("--ratio", help="Only this share of the vertices, not all of the suite; may be given again."),
+    ] = None,
     show_list: Annotated[bool, typer.Option("--list", help="List the suites and exit.")] = False,
     quiet: Annotated[bool, typer.Option("--quiet", "-q", help="No progress.")] = False,
 ) -> None:
@@ -34,6 +39,8 @@ def command(
     if suite is None:
         raise typer.BadParameter("name a suite, or list them with --list")
     wanted = load_suite(suite)
+    if ratios:
+        wanted = replace(wanted, ratios=tuple(ratios))
     from anisomesh.batch.runs import run_suite
     from anisomesh.batch.tables import markdown, web_page
     from anisomesh.surface.files import atomic_path
