@@ -43,6 +43,9 @@ def test_command_writes_rows_and_reports_and_goes_on(run_cli, tmp_path):
     assert all(row["evaluation"]["validity"]["closed"] for row in rows)
     page, text = (tmp_path / "out/two.html").read_text(), (tmp_path / "out/two.md").read_text()
     assert "two spheres" in page
+    assert "<svg" in page
+    assert "![Distance against quality](two.svg)" in text
+    assert "30% of the vertices" in (tmp_path / "out/two.svg").read_text()
     assert text.count("| ours |") >= 6
     again = run_cli("benchmark", tmp_path / "two.toml", "-o", tmp_path / "out")
     assert (again.returncode, again.stderr) == (0, "")

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import importlib.util
+import time
 import warnings
 from collections.abc import Callable
 from dataclasses import dataclass
@@ -11,7 +12,10 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from anisomesh.errors import AnisomeshError
+from anisomesh.surface.geometry import unit_frame
 from anisomesh.surface.mesh import Surface
+
+_MOST_RUNS = 12
 
 
 class Produced(NamedTuple):
@@ -27,6 +31,7 @@ class Remesher:
 
     run: Callable[[Surface, int, int, dict[str, Any]], Produced]
     packages: tuple[str, ...] = ()
+    isolated: bool = False  # in a process of its own, because it can end the process
 
     @property
     def missing(self) -> list[str]:
@@ -80,12 +85,65 @@ def _pymeshlab(surface: Surface, n: int, seed: int, options: dict[str, Any]) -> 
     return Produced(_used(mesh.vertex_matrix(), mesh.face_matrix()), {})
 
 
+def _mmg(surface: Surface, n: int, seed: int, options: dict[str, Any]) -> Produced:
+    """Run mmgs with its own anisotropic metric, at the Hausdorff distance that gives the number of vertices."""
+    return _mmg_search(surface, n, lambda size, mesh: {"anisosize": 1, "hausd": size, **options}, start=1e-3)
+
+
+def _mmg_with_metric(surface: Surface, n: int, seed: int, options: dict[str, Any]) -> Produced:
+    """Run mmgs with the metric of anisomesh, at the edge length that gives the number of vertices."""
+    from anisomesh.metric.tensor import compute_metric
+
+    frame = unit_frame(surface.points)
+    unit = surface.with_points(frame.to_unit(surface.points))
+    tensors = compute_metric(unit, options.get("metric", "curvature")).tensors
+    upper = np.ascontiguousarray(tensors[:, [0, 0, 0, 1, 1, 2], [0, 1, 2, 1, 2, 2]])
+
+    def settings(size: float, mesh: Any) -> dict[str, Any]:
+        mesh.set_field("tensor", upper / size**2)
+        return {"hausd": 1.0, "hgrad": -1.0}  # the metric alone decides
+
+    return _mmg_search(surface, n, settings, start=float(np.sqrt(unit.area / n)))
+
+
+def _mmg_search(
+    surface: Surface, n: int, settings: Callable[[float, Any], dict[str, Any]], *, start: float
+) -> Produced:
+    """Run mmgs at bounding-box diagonal 1 with ever better sizes, until the count is within 2 % of n."""
+    import mmgpy
+
+    frame = unit_frame(surface.points)
+    points = frame.to_unit(surface.points)
+    low, high, size = 0.0, np.inf, start
+    best: tuple[int, Any] | None = None
+    runs = 0
+    while runs < _MOST_RUNS:
+        runs += 1
+        mesh = mmgpy.MmgMeshS(np.array(points), np.array(surface.faces))
+        begin = time.perf_counter()
+        mesh.remesh(verbose=-1, **settings(size, mesh))
+        seconds = time.perf_counter() - begin
+        found = len(mesh.get_vertices())
+        if best is None or abs(found - n) < abs(best[0] - n):
+            best = found, mesh
+        if abs(found - n) <= 0.02 * n:
+            break
+        low, high = (size, high) if found > n else (low, size)
+        size = np.sqrt(low * high) if low > 0.0 and high < np.inf else size * (3.0 if found > n else 1.0 / 3.0)
+    assert best is not None
+    result = _used(best[1].get_vertices(), best[1].get_triangles())
+    model = Surface(frame.to_model(result.points), result.faces)
+    return Produced(model, {"runs": runs, "seconds_of_one_run": seconds})
+
+
 METHODS = {
     "anisomesh": Remesher(_anisomesh),
     "vtk-quadric": Remesher(_vtk_quadric, ("pyvista",)),
     "fast-simplification": Remesher(_fast_simplification, ("fast_simplification",)),
     "acvd": Remesher(_acvd, ("pyacvd", "pyvista")),
-    "pymeshlab-quadric": Remesher(_pymeshlab, ("pymeshlab",)),
+    "pymeshlab-quadric": Remesher(_pymeshlab, ("pymeshlab",), isolated=True),
+    "mmg": Remesher(_mmg, ("mmgpy",), isolated=True),
+    "mmg-metric": Remesher(_mmg_with_metric, ("mmgpy",), isolated=True),
 }
 """All methods by name. The options of a suite go to the library's own function."""
 

@@ -13,6 +13,7 @@ from typing import Any
 import numpy as np
 
 from anisomesh.batch.inputs import Input, inputs_of
+from anisomesh.batch.isolation import isolated
 from anisomesh.batch.methods import METHODS, Produced
 from anisomesh.batch.suite import Method, Suite
 from anisomesh.errors import AnisomeshError
@@ -148,7 +149,8 @@ def _run(job: _Job, surface: Surface, suite: Suite) -> Row:
     n = max(4, round(job.ratio * surface.n_points))
     start = time.perf_counter()
     try:
-        produced: Produced = remesher.run(surface, n, job.seed, job.method.options)
+        run = isolated(remesher.run) if remesher.isolated else remesher.run
+        produced: Produced = run(surface, n, job.seed, job.method.options)
         seconds = time.perf_counter() - start
         evaluation = evaluate(surface, produced.surface, samples=suite.samples).as_dict()
     except Exception as error:  # whatever a library does wrong is its result here

@@ -127,9 +127,10 @@ def _sections(suite: Suite, rows: Sequence[Row]) -> list[tuple[str, tuple[list[s
     return [section for section in sections if section[1][1]]
 
 
-def markdown(suite: Suite, rows: Sequence[Row]) -> str:
-    """Return the report of a suite as Markdown."""
+def markdown(suite: Suite, rows: Sequence[Row], chart: str = "") -> str:
+    """Return the report of a suite as Markdown; ``chart`` is the name of a picture to show."""
     parts = [f"# {suite.name}", suite.description.strip(), _remarks(rows)]
+    parts.append(f"![Distance against quality]({chart})" if chart else "")
     for title, (heading, lines) in _sections(suite, rows):
         cells = [heading, ["---"] * len(heading), *lines]
         table = "\n".join("| " + " | ".join(cell.replace("|", "\\|") for cell in line) + " |" for line in cells)
@@ -137,10 +138,11 @@ def markdown(suite: Suite, rows: Sequence[Row]) -> str:
     return "\n\n".join(part for part in parts if part) + "\n"
 
 
-def web_page(suite: Suite, rows: Sequence[Row]) -> str:
-    """Return the report of a suite as a page of HTML that needs nothing else."""
+def web_page(suite: Suite, rows: Sequence[Row], chart: str = "") -> str:
+    """Return the report of a suite as a page of HTML that needs nothing else; ``chart`` is SVG to show in it."""
     parts = [f"<h1>{html.escape(suite.name)}</h1>", f"<p>{html.escape(suite.description.strip())}</p>"]
     parts.append(f"<p>{html.escape(_remarks(rows))}</p>")
+    parts.append(chart[chart.find("<svg") :] if chart else "")
     for title, (heading, lines) in _sections(suite, rows):
         head = "".join(f"<th>{html.escape(cell)}</th>" for cell in heading)
         body = "\n".join("<tr>" + "".join(f"<td>{html.escape(cell)}</td>" for cell in line) + "</tr>" for line in lines)

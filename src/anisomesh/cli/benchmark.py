@@ -10,7 +10,8 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 if TYPE_CHECKING:
-    from anisomesh.batch.runs import Progress
+    from anisomesh.batch.runs import Progress, Row
+    from anisomesh.batch.suite import Suite
 
 
 def command(
@@ -48,10 +49,25 @@ def command(
     out.mkdir(parents=True, exist_ok=True)
     stem = out / wanted.name
     rows = run_suite(wanted, stem.with_suffix(".jsonl"), data=data, on_row=lambda step: None if quiet else _print(step))
-    for suffix, text in ((".md", markdown(wanted, rows)), (".html", web_page(wanted, rows))):
+    chart = _chart(wanted, rows)
+    texts = {".svg": chart} if chart else {}
+    texts[".md"] = markdown(wanted, rows, f"{wanted.name}.svg" if chart else "")
+    texts[".html"] = web_page(wanted, rows, chart)
+    for suffix, text in texts.items():
         with atomic_path(stem.with_suffix(suffix)) as temporary:
             Path(temporary).write_text(text, encoding="utf-8")
-    typer.echo(f"{len(rows):,} runs; wrote " + ", ".join(f"{stem}{suffix}" for suffix in (".jsonl", ".md", ".html")))
+    typer.echo(f"{len(rows):,} runs; wrote " + ", ".join(f"{stem}{suffix}" for suffix in (".jsonl", *texts)))
+
+
+def _chart(suite: Suite, rows: list[Row]) -> str:
+    """Return the chart of the report, nothing where it cannot be drawn."""
+    from anisomesh.batch.charts import trade_off
+
+    try:
+        return trade_off(suite, rows)
+    except ImportError:
+        print("the report has no chart: matplotlib is not installed (extra: picture)", file=sys.stderr)
+        return ""
 
 
 def _print(step: Progress) -> None:
