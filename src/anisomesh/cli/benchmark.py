@@ -9,6 +9,8 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
+from anisomesh.cli.progress import announce_compilation, progress
+
 if TYPE_CHECKING:
     from anisomesh.batch.runs import Progress, Row
     from anisomesh.batch.suite import Suite
@@ -46,6 +48,9 @@ def command(
     from anisomesh.batch.tables import markdown, web_page
     from anisomesh.surface.files import atomic_path
 
+    with progress(quiet) as display:
+        announce_compilation(display)
+        announce_compilation(display, "evaluate")
     out.mkdir(parents=True, exist_ok=True)
     stem = out / wanted.name
     rows = run_suite(wanted, stem.with_suffix(".jsonl"), data=data, on_row=lambda step: None if quiet else _print(step))
