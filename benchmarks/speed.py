@@ -117,7 +117,9 @@ def peak_above(work):
 
 remesh(ring(2000), ratio=0.5)
 surface = ring({n})
-stages = []
+used, _ = peak_above(lambda: remesh(surface, ratio=1.0, max_iterations=8))
+stages = [("whole remesh", used)]
+surface = ring({n})
 used, embedding = peak_above(lambda: embed(surface, compute_metric(surface).tensors))
 stages.append(("metric and embedding", used))
 voronoi = RestrictedVoronoi(embedding.points, surface.faces)
