@@ -7,7 +7,9 @@ import numpy.typing as npt
 
 from anisomesh._arrays import Faces, FaceScalars, Points, PointTensors
 from anisomesh.errors import MetricError
+from anisomesh.metric.tensor import compute_metric, metric_root
 from anisomesh.surface.closest import ClosestPoints
+from anisomesh.surface.mesh import Surface
 
 _BLOCK = 16_384  # triangles at a time, so that the memory in between is bounded
 
@@ -50,6 +52,15 @@ def _quality(corners: Corners, roots: PointTensors) -> FaceScalars:
     denominator = 0.5 * lengths.sum(axis=1) * lengths.max(axis=1)
     regular = 2.0 * np.sqrt(3.0)
     return np.asarray(np.divide(regular * area, denominator, out=np.zeros_like(area), where=denominator > 0.0))
+
+
+def quality_on(reference: ClosestPoints, surface: Surface) -> FaceScalars:
+    """Return the quality G (F,) of the triangles of a remesh in the paper's metric of its reference.
+
+    Both at bounding-box diagonal 1 of the reference; each vertex takes the metric from the closest point.
+    """
+    roots = metric_root(compute_metric(reference.surface).tensors)
+    return anisotropic_quality(surface.points, surface.faces, transfer_metric_roots(reference, roots, surface.points))
 
 
 def transfer_metric_roots(reference: ClosestPoints, roots: PointTensors, query_points: Points) -> PointTensors:

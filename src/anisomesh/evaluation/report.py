@@ -10,11 +10,10 @@ import numpy as np
 from anisomesh.evaluation.distance import SurfaceDistance, surface_distance
 from anisomesh.evaluation.intersections import self_intersections
 from anisomesh.evaluation.preservation import FeaturePreservation, feature_preservation
-from anisomesh.evaluation.quality import anisotropic_quality, transfer_metric_roots
+from anisomesh.evaluation.quality import quality_on
 from anisomesh.evaluation.sampled import CREASE_ANGLE, DEFAULT_SAMPLES, SampledMeasures, sampled_measures
 from anisomesh.evaluation.shape import ShapeStatistics, shape_statistics
 from anisomesh.evaluation.validity import Validity, check_validity
-from anisomesh.metric.tensor import compute_metric, metric_root
 from anisomesh.surface.closest import ClosestPoints
 from anisomesh.surface.convert import as_surface
 from anisomesh.surface.geometry import unit_frame
@@ -120,7 +119,6 @@ def evaluate(
     given = as_surface(result)
     b = Surface(frame.to_unit(given.points), given.faces)
     closest = ClosestPoints(a)
-    roots = transfer_metric_roots(closest, metric_root(compute_metric(a).tensors), b.points)
     squared = closest.squared_distances(b.points[np.unique(b.faces)])
     rng = np.random.default_rng(seed)
     return Evaluation(
@@ -131,7 +129,7 @@ def evaluate(
         distance=surface_distance(a, b, samples=samples, seed=rng),
         vertex_rms=float(np.sqrt(squared.mean())),
         vertex_max=float(np.sqrt(squared.max())),
-        shape=shape_statistics(b, anisotropic_quality(b.points, b.faces, roots)),
+        shape=shape_statistics(b, quality_on(closest, b)),
         features=feature_preservation(a, b, crease_angle=crease_angle),
         validity=check_validity(b, a),
         self_intersections=len(self_intersections(b)),

@@ -10,8 +10,7 @@ import numpy.typing as npt
 
 from anisomesh._arrays import FaceScalars
 from anisomesh.evaluation.distance import squared_distances
-from anisomesh.evaluation.quality import anisotropic_quality, transfer_metric_roots
-from anisomesh.metric.tensor import compute_metric, metric_root
+from anisomesh.evaluation.quality import quality_on
 from anisomesh.picture.view import triangle_stretch
 from anisomesh.surface.closest import ClosestPoints
 from anisomesh.surface.geometry import unit_frame
@@ -92,9 +91,7 @@ def quality_colouring(surface: Surface, reference: Surface) -> Colouring:
     """
     frame = unit_frame(reference.points)
     base = reference.with_points(frame.to_unit(reference.points))
-    points = frame.to_unit(surface.points)
-    roots = transfer_metric_roots(ClosestPoints(base), metric_root(compute_metric(base).tensors), points)
-    values = anisotropic_quality(points, surface.faces, roots)
+    values = quality_on(ClosestPoints(base), surface.with_points(frame.to_unit(surface.points)))
     name = f"quality G of the triangles in the metric, mean {_mean(values):.2f}"
     return Colouring(values=values, name=name, colours="RdYlBu", part=(0.05, 0.8), low=0.0, high=1.0)
 
