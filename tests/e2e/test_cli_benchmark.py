@@ -52,6 +52,22 @@ def test_command_writes_rows_and_reports_and_goes_on(run_cli, tmp_path):
     assert (tmp_path / "out/two.jsonl").read_text().splitlines() == [json.dumps(row) for row in rows]
 
 
+def test_smoke_suite_runs_and_ours_are_valid_and_in_the_order_of_the_paper(run_cli, tmp_path):
+    done = run_cli("benchmark", "smoke", "-o", tmp_path, "--quiet")
+    assert done.returncode == 0, done.stderr
+    rows = read_rows(tmp_path / "smoke.jsonl")
+    assert {row["status"] for row in rows} <= {"done", "absent"}
+    found = {(row["mesh"], row["method"]): row["evaluation"] for row in rows if row["status"] == "done"}
+    for mesh in {row["mesh"] for row in rows}:
+        normal_metric, plain = found[mesh, "anisomesh, s = 7"], found[mesh, "plain CVT (s = 1)"]
+        for evaluation in (normal_metric, plain):
+            validity = evaluation["validity"]
+            assert validity["euler"] == validity["euler_input"]
+            assert not (validity["nonmanifold_edges"] or validity["nonmanifold_vertices"] or validity["flipped"])
+        assert normal_metric["distance"]["rms"] < plain["distance"]["rms"]
+        assert normal_metric["shape"]["g_mean"] < plain["shape"]["g_mean"]
+
+
 def test_one_ratio_of_a_suite(run_cli, tmp_path):
     (tmp_path / "two.toml").write_text(TOML)
     done = run_cli("benchmark", tmp_path / "two.toml", "-o", tmp_path, "--ratio", 0.3, "--quiet")

@@ -15,7 +15,7 @@ from anisomesh.errors import AnisomeshError
 from anisomesh.surface.geometry import unit_frame
 from anisomesh.surface.mesh import Surface
 
-_MOST_RUNS = 12
+_MOST_RUNS = 8
 
 
 class Produced(NamedTuple):
@@ -114,26 +114,32 @@ def _mmg_search(
 
     frame = unit_frame(surface.points)
     points = frame.to_unit(surface.points)
-    low, high, size = 0.0, np.inf, start
-    best: tuple[int, Any] | None = None
-    runs = 0
-    while runs < _MOST_RUNS:
-        runs += 1
+    size, power = start, -1.0  # the count is about proportional to a power of the size, found from run to run
+    tried: list[tuple[float, int, Any]] = []
+    while len(tried) < _MOST_RUNS:
         mesh = mmgpy.MmgMeshS(np.array(points), np.array(surface.faces))
         begin = time.perf_counter()
         mesh.remesh(verbose=-1, **settings(size, mesh))
         seconds = time.perf_counter() - begin
-        found = len(mesh.get_vertices())
-        if best is None or abs(found - n) < abs(best[0] - n):
-            best = found, mesh
-        if abs(found - n) <= 0.02 * n:
+        tried.append((size, len(mesh.get_vertices()), mesh))
+        best = min(tried, key=lambda run: abs(run[1] - n))
+        if abs(best[1] - n) <= 0.02 * n:
             break
-        low, high = (size, high) if found > n else (low, size)
-        size = np.sqrt(low * high) if low > 0.0 and high < np.inf else size * (3.0 if found > n else 1.0 / 3.0)
-    assert best is not None
-    result = _used(best[1].get_vertices(), best[1].get_triangles())
+        if len(tried) > 1 and tried[-1][1] != tried[-2][1]:
+            steps = [np.log(tried[-1][k] / tried[-2][k]) for k in (0, 1)]
+            power = float(np.clip(steps[1] / steps[0], -4.0, -0.25))
+        size = best[0] * float(np.clip((n / best[1]) ** (1.0 / power), 0.2, 5.0))
+        size = _between(size, tried, n)
+    result = _used(best[2].get_vertices(), best[2].get_triangles())
     model = Surface(frame.to_model(result.points), result.faces)
-    return Produced(model, {"runs": runs, "seconds_of_one_run": seconds})
+    return Produced(model, {"runs": len(tried), "seconds_of_one_run": seconds})
+
+
+def _between(size: float, tried: list[tuple[float, int, Any]], n: int) -> float:
+    """Return a size, or the geometric middle where it is outside the sizes known to give too many and too few."""
+    low = max((run[0] for run in tried if run[1] > n), default=0.0)
+    high = min((run[0] for run in tried if run[1] <= n), default=np.inf)
+    return size if low < size < high or low >= high else float(np.sqrt(low * high))
 
 
 METHODS = {
