@@ -11,6 +11,7 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
+from anisomesh.cvt.arcs import Boundary
 from anisomesh.cvt.optimise import Optimised, lloyd, minimise
 from anisomesh.cvt.sampling import resample_by_energy, sample_surface
 from anisomesh.cvt.voronoi import RestrictedVoronoi
@@ -106,11 +107,19 @@ def remesh(
     with run.stage("cvt"):
         voronoi = RestrictedVoronoi(embedding.points, working.faces, threads=options.threads)
         ordered = Surface(working.points, voronoi.faces)
-        optimised = optimise(voronoi, n, ordered, embedding.scale, options, run.on_step)
+        boundary = Boundary(voronoi, ordered, n, options.crease_angle)
+        optimised = optimise(voronoi, n, ordered, boundary, embedding.scale, options, run.on_step)
     with run.stage("dual"):
         angle = options.crease_angle if options.sharpness > 1.0 else 180.0
         refined = refine(
-            voronoi, optimised.sites, ordered, embedding.scale, n_vertices=n, crease_angle=angle, tensors=metric.tensors
+            voronoi,
+            optimised.sites,
+            ordered,
+            boundary,
+            embedding.scale,
+            n_vertices=n,
+            crease_angle=angle,
+            tensors=metric.tensors,
         )
         surface = Surface(frame.to_model(refined.points), refined.faces)
         validity = check_validity(surface, prepared.surface)
@@ -145,12 +154,19 @@ def max_edge(surface: Surface, n_vertices: int) -> float:
 
 
 def optimise(
-    voronoi: RestrictedVoronoi, n: int, surface: Surface, scale: float, options: RemeshOptions, on_step: OnStep
+    voronoi: RestrictedVoronoi,
+    n: int,
+    surface: Surface,
+    boundary: Boundary,
+    scale: float,
+    options: RemeshOptions,
+    on_step: OnStep,
 ) -> Optimised:
     """Return n optimised sites: a random start, Lloyd's algorithm, then L-BFGS on the normal-metric energy.
 
     With a normal metric the sites are drawn anew within Lloyd's algorithm, denser where the surface bends within a
-    cell, and a few of them are exchanged within L-BFGS, for points that the dual would miss.
+    cell, and a few of them are exchanged within L-BFGS, for points that the dual would miss. Sites of cells at the
+    boundary go onto it before L-BFGS and stay there.
     """
     late = options.max_iterations // 2 if options.final_sharpness is not None else 0
     total = options.lloyd_iterations + options.max_iterations + late
@@ -175,10 +191,13 @@ def optimise(
     if options.final_sharpness is not None:
         schedule.append((options.final_sharpness, late))
     iterations = evaluations = 0
+    fixed = np.zeros(n, dtype=bool)
     for stage, (sharpness, limit) in enumerate(schedule):
         if stage > 0 and options.sharpness > 1.0:
-            sites = exchange_sites(voronoi, sites, surface, scale, sharpness)
-        result = minimise(voronoi, sites, sharpness=sharpness, max_iterations=limit, on_step=report)
+            sites = exchange_sites(voronoi, sites, surface, scale, sharpness, kept=fixed)
+        if boundary.curves.n_curves:
+            sites, fixed = boundary.spread(voronoi, sites, fixed)
+        result = minimise(voronoi, sites, sharpness=sharpness, max_iterations=limit, on_step=report, fixed=fixed)
         sites = result.sites
         done += limit
         iterations += result.iterations
@@ -241,8 +260,6 @@ def _warnings(n: int, surface: Surface, refined: Refined, validity: Validity) ->
         )
     if abs(surface.n_points - n) > COUNT_TOLERANCE * n:
         yield f"{surface.n_points:,} vertices instead of {n:,}: fewer would fold the surface or change its topology"
-    if not validity.closed:
-        yield "the surface is open: its boundary shrinks by about half a triangle"
     if validity.euler != validity.euler_input:
         yield f"the Euler characteristic is {validity.euler} instead of {validity.euler_input}; ask for more vertices"
     if validity.flipped:

@@ -5,6 +5,7 @@ import numpy as np
 import pytest
 from dual_cases import assert_closed_manifold
 
+from anisomesh.cvt.arcs import Boundary
 from anisomesh.cvt.optimise import lloyd
 from anisomesh.cvt.voronoi import RestrictedVoronoi
 from anisomesh.dual.cells import cells_of
@@ -36,6 +37,7 @@ def mended(voronoi, sites, surface, scale=1.0, crease_angle=180.0):
         voronoi,
         sites,
         surface,
+        Boundary(voronoi, surface, len(sites), crease_angle),
         scale,
         n_vertices=len(sites),
         crease_angle=crease_angle,

@@ -157,12 +157,12 @@ def test_corners_of_a_box_are_its_corners():
 
 def test_missed_corners_are_met_after_snapping():
     surface, _, diagram, cells = _box_dual(200, seed=3)
-    points, faces, done = simplicial_mesh(dual_mesh(diagram, cells, surface.face_edges))
+    points, faces, done = simplicial_mesh(dual_mesh(diagram, cells, surface))
     assert done
     sharp = sharp_edges(surface, 45.0)
     ends = surface.points[corners(surface, sharp)]
     before = np.sqrt(ClosestPoints(Surface(points, faces)).squared_distances(ends))
-    snapped = snap_to_missed(diagram, cells, surface, points, faces, sharp)
+    snapped = snap_to_missed(diagram, cells, surface, points, faces, sharp, np.ones(len(cells.site), dtype=bool))
     after = np.sqrt(ClosestPoints(Surface(snapped, faces)).squared_distances(ends))
     assert before.max() > 0.01
     assert (after < 1e-9).sum() > (before < 1e-9).sum()

@@ -17,7 +17,7 @@ def dual_case(surface, sites, points=None, iterations=0):
     diagram = voronoi.diagram(sites)
     ordered = Surface(surface.points, voronoi.faces)
     cells = cells_of(diagram, ordered.face_neighbours, voronoi.facets.area)
-    return diagram, cells, dual_mesh(diagram, cells, ordered.face_edges)
+    return diagram, cells, dual_mesh(diagram, cells, ordered)
 
 
 def assert_closed_manifold(faces, euler):

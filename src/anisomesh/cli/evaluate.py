@@ -63,6 +63,7 @@ def text(evaluation: Evaluation) -> str:
         ),
         ("creases", f"{features.crease_covered:.1%} of length {features.crease_length:.3g} covered"),
         ("corners", f"{features.corners_kept:,} of {features.corners:,} kept"),
+        ("boundary", _boundary(evaluation)),
         ("samples", "  ".join(f"{name:>10}" for name in PAPER)),
         ("  measured", "  ".join(f"{_paper(evaluation.sampled.as_dict(), name):>10}" for name in PAPER)),
         ("  floor", "  ".join(f"{_paper(evaluation.floor.as_dict(), name):>10}" for name in PAPER)),
@@ -85,6 +86,14 @@ def _paper(measures: dict[str, Any], name: str) -> str:
     key, factor = PAPER[name]
     value = measures[key]
     return "-" if value is None else f"{factor * value:.3f}"
+
+
+def _boundary(evaluation: Evaluation) -> str:
+    found = evaluation.boundary
+    if found is None:
+        return "none to compare"
+    mean, most = max(found.mean_ab, found.mean_ba), max(found.max_ab, found.max_ba)
+    return f"mean distance {mean:.3g}, largest {most:.3g}"
 
 
 def _crossing(evaluation: Evaluation) -> str:

@@ -38,10 +38,13 @@ class Optimised:
 
 
 Step = Callable[[int, float], None]
+Mask = npt.NDArray[np.bool_]
 
 
-def lloyd(voronoi: RestrictedVoronoi, sites: Sites, iterations: int, on_step: Step | None = None) -> Sites:
-    """Move every site to the centroid of its cell, a number of times; return the sites (S, d).
+def lloyd(
+    voronoi: RestrictedVoronoi, sites: Sites, iterations: int, on_step: Step | None = None, *, fixed: Mask | None = None
+) -> Sites:
+    """Move every site but the fixed ones (S,) to the centroid of its cell, a number of times; return the sites (S, d).
 
     A site with an empty cell (hidden by another at the same place) stays.
 
@@ -50,7 +53,7 @@ def lloyd(voronoi: RestrictedVoronoi, sites: Sites, iterations: int, on_step: St
     Lloyd 1982; Du, Faber, Gunzburger, "Centroidal Voronoi tessellations", SIAM Review 1999.
     """
     for iteration in range(iterations):
-        evaluation = voronoi.evaluate(sites, 1.0)
+        evaluation = _evaluate(voronoi, sites, 1.0, fixed)
         sites = sites - _per_site(evaluation.gradient, 2.0 * evaluation.mass)
         if on_step is not None:
             on_step(iteration + 1, evaluation.energy)
@@ -66,6 +69,7 @@ def minimise(
     memory: int = 7,
     tolerance: float = 1e-4,
     on_step: Step | None = None,
+    fixed: Mask | None = None,
 ) -> Optimised:
     """Minimise the normal-metric CVT energy from these sites by L-BFGS.
 
@@ -85,6 +89,10 @@ def minimise(
         The optimisation has converged when the root mean square, weighted by cell area, of the step gradient /
         (2 area), which is Lloyd's for s = 1, falls below this share of the square root of energy / area: when the
         sites would move by about that share of a cell's radius. It is tested before every iteration.
+    on_step
+        Called with iteration and energy after every iteration.
+    fixed
+        Sites that stay where they are (S,).
 
     Notes
     -----
@@ -101,7 +109,7 @@ def minimise(
     Liu, Wang, Levy, Sun, Yan, Lu, Yang, "On centroidal Voronoi tessellation: energy smoothness and fast
     computation", TOG 2009; Nocedal and Wright, "Numerical optimization", algorithm 7.4.
     """
-    here = voronoi.evaluate(sites, sharpness)
+    here = _evaluate(voronoi, sites, sharpness, fixed)
     evaluations = 1
     pairs: deque[tuple[Sites, Sites, float]] = deque(maxlen=memory)
     status = Status.ITERATION_LIMIT
@@ -116,7 +124,9 @@ def minimise(
             pairs.clear()
             direction = _direction(here, pairs)
             slope = _dot(here.gradient, direction)
-        step, there, trials = _line_search(voronoi, sites, here, direction, slope, sharpness)
+        step, there, trials = _line_search(
+            lambda place: _evaluate(voronoi, place, sharpness, fixed), sites, here, direction, slope
+        )
         evaluations += trials
         if there is None:
             if not pairs:
@@ -137,14 +147,22 @@ def minimise(
     return Optimised(sites=sites, energy=here.energy, iterations=iteration, evaluations=evaluations, status=status)
 
 
+def _evaluate(voronoi: RestrictedVoronoi, sites: Sites, sharpness: float, fixed: Mask | None) -> Evaluation:
+    """Return energy and gradient, the gradient of fixed sites as zero."""
+    evaluation = voronoi.evaluate(sites, sharpness)
+    if fixed is not None:
+        evaluation.gradient[fixed] = 0.0
+    return evaluation
+
+
 def _line_search(
-    voronoi: RestrictedVoronoi, sites: Sites, here: Evaluation, direction: Sites, slope: float, sharpness: float
+    evaluate: Callable[[Sites], Evaluation], sites: Sites, here: Evaluation, direction: Sites, slope: float
 ) -> tuple[float, Evaluation | None, int]:
     """Return a step that satisfies the weak Wolfe conditions, its evaluation, and the number of trials."""
     low, high, step = 0.0, np.inf, 1.0
     best: tuple[float, Evaluation | None] = (0.0, None)
     for trial in range(1, _MAX_TRIALS + 1):
-        there = voronoi.evaluate(sites + step * direction, sharpness)
+        there = evaluate(sites + step * direction)
         if there.energy > here.energy + _ARMIJO * step * slope:
             high = step
         else:

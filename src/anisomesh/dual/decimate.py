@@ -45,7 +45,7 @@ def decimate(points: Points, faces: Faces, n_points: int, reference: ClosestPoin
     link condition (Dey, Edelsbrunner, Guha, Nekhayev 1999), so topology, orientation and boundary loops stay, and
     no face turns by more than about 80 degrees.
     """
-    quadrics = _quadrics(points, faces)
+    quadrics = _quadrics(Surface(points, faces))
     surplus = len(points) - n_points
     refused = np.zeros(0, dtype=np.int64)
     while surplus > 0:
@@ -65,16 +65,25 @@ def decimate(points: Points, faces: Faces, n_points: int, reference: ClosestPoin
     return points[used], faces.reshape(-1, 3).astype(np.int32)
 
 
-def _quadrics(points: Points, faces: Faces) -> Floats:
-    """Return the sum over the faces at each point of area times the squared plane (V, 4, 4)."""
-    cross = geometry.face_cross(points, faces)
-    normal = geometry.unit(cross)
-    plane = np.concatenate([normal, -np.einsum("fx,fx->f", normal, points[faces[:, 0]])[:, None]], axis=1)
-    area = 0.5 * np.linalg.norm(cross, axis=1)
-    terms = area[:, None, None] * plane[:, :, None] * plane[:, None, :]
-    result = np.zeros((len(points), 4, 4))
-    for corner in range(3):
-        np.add.at(result, faces[:, corner], terms)
+def _quadrics(surface: Surface) -> Floats:
+    """Return the sum of weight times squared plane at each point (V, 4, 4).
+
+    The planes are those of the faces, weighted by area, and at a boundary edge the one upright on the face through the
+    edge, weighted by squared length.
+    """
+    points, side, face = surface.points, surface.edges, surface.edge_faces[:, 0]
+    rim = np.flatnonzero(surface.edge_face_count == 1)
+    along = points[side[rim, 1]] - points[side[rim, 0]]
+    upright = geometry.unit(np.cross(along, surface.face_normals[face[rim]]))
+    result = np.zeros((surface.n_points, 4, 4))
+    for normal, place, weight, ends in (
+        (surface.face_normals, points[surface.faces[:, 0]], surface.face_areas, surface.faces),
+        (upright, points[side[rim, 0]], (along**2).sum(axis=1), side[rim]),
+    ):
+        plane = np.concatenate([normal, -np.einsum("nx,nx->n", normal, place)[:, None]], axis=1)
+        terms = weight[:, None, None] * plane[:, :, None] * plane[:, None, :]
+        for corner in ends.T:
+            np.add.at(result, corner, terms)
     return result
 
 
@@ -87,9 +96,7 @@ def _collapses(
     """
     edges = surface.edges[collapsible_edges(surface)].astype(np.int64)
     gone, into = np.concatenate([edges, edges[:, ::-1]]).T
-    on_boundary = np.zeros(surface.n_points, dtype=bool)
-    on_boundary[surface.edges[surface.edge_face_count == 1]] = True
-    allowed = ~on_boundary[gone] | on_boundary[into]
+    allowed = ~surface.on_boundary[gone] | surface.on_boundary[into]
     allowed &= ~np.isin(gone * surface.n_points + into, refused)
     gone, into = gone[allowed], into[allowed]
     place = np.concatenate([surface.points[into], np.ones((len(into), 1))], axis=1)
@@ -117,9 +124,7 @@ def collapsible_edges(surface: Surface) -> npt.NDArray[np.bool_]:
     adjacency = csr_array((np.ones(len(rows), dtype=np.int32), (rows, columns)), shape=(n, n))
     common = np.asarray((adjacency @ adjacency)[edges[:, 0], edges[:, 1]]).ravel()
     valence = np.diff(adjacency.indptr)
-    on_boundary = np.zeros(n, dtype=bool)
-    on_boundary[edges[surface.edge_face_count == 1]] = True
-    across = on_boundary[edges].all(axis=1) & (surface.edge_face_count == 2)
+    across = surface.on_boundary[edges].all(axis=1) & (surface.edge_face_count == 2)
     tetrahedron = (valence[edges] == 3).all(axis=1)
     return np.asarray((common == surface.edge_face_count) & ~across & ~tetrahedron)
 

@@ -18,7 +18,15 @@ _WORTH = 4.0  # a point is missed if its squared distance is that many times the
 _POOL = 20  # candidates looked at per site exchanged
 
 
-def exchange_sites(voronoi: RestrictedVoronoi, sites: Sites, surface: Surface, scale: float, sharpness: float) -> Sites:
+def exchange_sites(
+    voronoi: RestrictedVoronoi,
+    sites: Sites,
+    surface: Surface,
+    scale: float,
+    sharpness: float,
+    *,
+    kept: npt.NDArray[np.bool_] | None = None,
+) -> Sites:
     """Return as many sites (S, d), some of them moved to points of the surface that the dual misses.
 
     Parameters
@@ -33,6 +41,8 @@ def exchange_sites(voronoi: RestrictedVoronoi, sites: Sites, surface: Surface, s
         The factor of the first three embedded coordinates.
     sharpness
         The factor s of the normal metric of the energy by which the least important sites are found.
+    kept
+        Sites that do not go (S,).
 
     Notes
     -----
@@ -42,7 +52,7 @@ def exchange_sites(voronoi: RestrictedVoronoi, sites: Sites, surface: Surface, s
     """
     diagram = voronoi.diagram(sites)
     cells = cells_of(diagram, surface.face_neighbours, voronoi.facets.area)
-    dual = dual_mesh(diagram, cells, surface.face_edges)
+    dual = dual_mesh(diagram, cells, surface)
     if len(dual.faces) == 0:
         return sites
     squared = ClosestPoints(Surface(dual.points[:, :3] / scale, dual.faces)).squared_distances(surface.points)
@@ -50,8 +60,10 @@ def exchange_sites(voronoi: RestrictedVoronoi, sites: Sites, surface: Surface, s
     n = max(1, int(_SHARE * len(sites)))
     new = _spaced(voronoi.points, np.argsort(-squared, kind="stable"), n, spacing)
     new = new[squared[new] > _WORTH * squared.mean()]
-    energy = voronoi.evaluate(sites, sharpness).cell_energy
-    old = _spaced(sites, np.argsort(energy, kind="stable"), len(new), 2.0 * spacing)
+    order = np.argsort(voronoi.evaluate(sites, sharpness).cell_energy, kind="stable")
+    if kept is not None:
+        order = order[~kept[order]]
+    old = _spaced(sites, order, len(new), 2.0 * spacing)
     result = np.array(sites)
     result[old] = voronoi.points[new[: len(old)]]
     return result

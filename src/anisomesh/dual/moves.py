@@ -1,4 +1,4 @@
-"""Moves of points that turn back triangles that face away from the surface."""
+"""Moves of points within the boundary that turn back triangles that face away from the surface."""
 
 from __future__ import annotations
 
@@ -31,7 +31,10 @@ def nudge(surface: Surface, turned: FaceMask, reference: ClosestPoints) -> tuple
 def wander(surface: Surface, turned: FaceMask, reference: ClosestPoints, rng: np.random.Generator) -> Points:
     """Return the points after a random small move of one of them that leaves as many turned triangles as before."""
     for face in np.flatnonzero(turned).tolist():
-        point = int(rng.choice(surface.faces[face]))
+        movable = surface.faces[face][~surface.on_boundary[surface.faces[face]]]
+        if len(movable) == 0:
+            continue
+        point = int(rng.choice(movable))
         around = np.flatnonzero((surface.faces == point).any(axis=1))
         ring = np.setdiff1d(surface.faces[around], [point])
         places = _nudges(surface, point, ring, reference)
@@ -50,6 +53,9 @@ def relax(surface: Surface, turned: FaceMask, reference: ClosestPoints) -> tuple
     near = np.zeros(surface.n_points, dtype=bool)
     near[surface.faces[turned]] = True
     near[surface.faces[near[surface.faces].any(axis=1)]] = True
+    near &= ~surface.on_boundary
+    if not near.any():
+        return None
     rows, columns = np.concatenate([surface.edges, surface.edges[:, ::-1]]).T
     rows, columns = rows[near[rows]], columns[near[rows]]
     count = np.bincount(rows, minlength=surface.n_points)[near]
@@ -72,6 +78,7 @@ def _move(
     points = surface.points.copy()
     faces_at: dict[int, list[int]] = {}
     candidates = np.unique(surface.faces[turned])
+    candidates = candidates[~surface.on_boundary[candidates]]
     for face in np.flatnonzero(np.isin(surface.faces, candidates).any(axis=1)).tolist():
         for point in surface.faces[face].tolist():
             faces_at.setdefault(point, []).append(face)

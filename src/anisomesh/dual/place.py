@@ -69,7 +69,13 @@ def _per_cell(cells: Cells, values: npt.NDArray[np.float64]) -> npt.NDArray[np.f
 
 
 def snap_to_missed(
-    diagram: Diagram, cells: Cells, surface: Surface, points: Points, faces: Faces, sharp: npt.NDArray[np.bool_]
+    diagram: Diagram,
+    cells: Cells,
+    surface: Surface,
+    points: Points,
+    faces: Faces,
+    sharp: npt.NDArray[np.bool_],
+    movable: npt.NDArray[np.bool_],
 ) -> Points:
     """Return the points (V, 3), some of them moved to corners that the mesh misses.
 
@@ -83,6 +89,8 @@ def snap_to_missed(
         The dual in space (V, 3), (F, 3).
     sharp
         Which edges of the surface (E,) are creases.
+    movable
+        Cells whose vertex may move (C,).
 
     Notes
     -----
@@ -98,7 +106,7 @@ def snap_to_missed(
     mesh = Surface(points, faces)
     missed = (_MISSED * float(mesh.edge_lengths.mean())) ** 2
     squared = ClosestPoints(mesh).squared_distances(surface.points)
-    candidate = np.flatnonzero(corners(surface, sharp) & (owner >= 0) & (squared > missed))
+    candidate = np.flatnonzero(corners(surface, sharp) & (owner >= 0) & movable[owner] & (squared > missed))
     candidate = candidate[np.argsort(squared[candidate], kind="stable")]
     moved = np.array(points)
     moved[owner[candidate]] = surface.points[candidate]  # of several in a cell the last, the farthest, stays

@@ -8,8 +8,10 @@ import numpy as np
 import numpy.typing as npt
 
 from anisomesh._arrays import EmbeddedPoints, Faces, Points, PointTensors, Sites
+from anisomesh.cvt.arcs import Boundary
 from anisomesh.cvt.diagram import Diagram
 from anisomesh.cvt.voronoi import RestrictedVoronoi
+from anisomesh.dual.boundary import put_on_boundary, sites_for_arcs
 from anisomesh.dual.cells import Cells, cells_of
 from anisomesh.dual.decimate import decimate
 from anisomesh.dual.flip import flip_for_shape
@@ -61,6 +63,7 @@ def refine(
     voronoi: RestrictedVoronoi,
     sites: Sites,
     surface: Surface,
+    boundary: Boundary,
     scale: float,
     *,
     n_vertices: int,
@@ -77,6 +80,8 @@ def refine(
         Optimised positions (S, d).
     surface
         The surface in space, its faces in the order of ``voronoi``.
+    boundary
+        Its boundary.
     scale
         The factor of the first three embedded coordinates.
     n_vertices
@@ -107,18 +112,23 @@ def refine(
         diagram = voronoi.diagram(sites)
         cells = cells_of(diagram, surface.face_neighbours, voronoi.facets.area)
         bad = cells.euler != 1
-        if not bad.any() or bad.mean() > MAX_SHARE:
+        arcs = boundary.arcs(diagram)
+        missing = sites_for_arcs(arcs, boundary.curves, cells, sites)
+        if not (bad.any() or len(missing)) or bad.mean() > MAX_SHARE:
             break
-        sites = np.concatenate([sites, _inside(diagram, cells, bad)])
+        sites = np.concatenate([sites, _inside(diagram, cells, bad), missing])
     from_input = bool(bad.any())
     if from_input:
         points, faces = voronoi.points, surface.faces
     else:
-        points, faces, _ = simplicial_mesh(dual_mesh(diagram, cells, surface.face_edges))
+        points, faces, _ = simplicial_mesh(dual_mesh(diagram, cells, surface))
+        points, on_boundary = put_on_boundary(points, arcs, cells)
         sharp = sharp_edges(surface, crease_angle)
         creased = creased_cells(diagram, cells, surface, sharp)
+        creased = creased[~on_boundary[creased]]
         points[creased, :3] = scale * crease_positions(voronoi, diagram, cells, scale, creased)
-        points[:, :3] = scale * snap_to_missed(diagram, cells, surface, points[:, :3] / scale, faces, sharp)
+        inside = ~on_boundary[: len(cells.site)]
+        points[:, :3] = scale * snap_to_missed(diagram, cells, surface, points[:, :3] / scale, faces, sharp, inside)
     inserted = max(len(points) - n_start, 0) if not from_input else 0
     reference = ClosestPoints(surface)
     space, faces, turned = untangle(points[:, :3] / scale, faces, reference)

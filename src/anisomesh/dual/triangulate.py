@@ -11,6 +11,7 @@ from anisomesh._arrays import FaceIndices, Faces, Points
 from anisomesh.cvt.diagram import Diagram
 from anisomesh.dual.cells import Cells
 from anisomesh.dual.chains import chains
+from anisomesh.surface.mesh import Surface
 
 
 @dataclass(frozen=True, eq=False)
@@ -27,7 +28,7 @@ class Dual:
         The chain that each side, opposite corner 0, 1, 2, is dual to (T, 3). Triangles with a chain in common are
         neighbours, even where another chain joins the same two components.
     edge_points
-        A point of the embedded surface on every chain (K, d).
+        A point of the embedded surface on every chain (K, d), on the boundary if the chain ends there.
     vertex
         Vertex of the diagram that each triangle is dual to (T,).
     """
@@ -39,7 +40,7 @@ class Dual:
     vertex: npt.NDArray[np.int64]
 
 
-def dual_mesh(diagram: Diagram, cells: Cells, face_edges: FaceIndices) -> Dual:
+def dual_mesh(diagram: Diagram, cells: Cells, surface: Surface) -> Dual:
     """Return the dual triangulation of a diagram.
 
     A triangle stands for every point where three cells meet, and joins the components that meet there, not
@@ -51,8 +52,8 @@ def dual_mesh(diagram: Diagram, cells: Cells, face_edges: FaceIndices) -> Dual:
     ----------
     diagram, cells
         The diagram and the components of its cells.
-    face_edges
-        Mesh edge opposite each corner (F, 3) of the faces of the diagram.
+    surface
+        The surface, its faces in the order of the diagram.
 
     Notes
     -----
@@ -66,23 +67,31 @@ def dual_mesh(diagram: Diagram, cells: Cells, face_edges: FaceIndices) -> Dual:
     second = diagram.polygon_index(facet, before[vertex])
     third = diagram.polygon_index(facet, after[vertex])
     polygons = np.stack([diagram.polygon_of[vertex], second, third], axis=1)
-    chain = chains(diagram, face_edges)
+    chain = chains(diagram, surface.face_edges)
     # around the vertex, the edge that arrives in the second polygon is the one between second and third
     across = diagram.previous[diagram.twin[diagram.previous[vertex]]]
     return Dual(
         points=np.where(cells.alone[:, None], diagram.sites[cells.site], cells.centroid),
         faces=cells.of_polygon[polygons].astype(np.int32),
         face_edges=np.stack([chain[across], chain[vertex], chain[diagram.previous[vertex]]], axis=1),
-        edge_points=_chain_points(diagram, chain),
+        edge_points=_chain_points(diagram, chain, surface.face_neighbours),
         vertex=vertex,
     )
 
 
-def _chain_points(diagram: Diagram, chain: npt.NDArray[np.int32]) -> Points:
-    """Return the middle of the middle segment of every chain (K, d)."""
+def _chain_points(diagram: Diagram, chain: npt.NDArray[np.int32], face_neighbours: FaceIndices) -> Points:
+    """Return the end of every chain on the boundary of the surface, or else the middle of its middle segment (K, d)."""
     segments = np.flatnonzero(chain >= 0)
     segments = segments[np.argsort(chain[segments], kind="stable")]
     count = np.bincount(chain[segments])
     middle = segments[np.cumsum(count) - count + count // 2]
     facet = diagram.facet[diagram.polygon_of[middle]]
-    return diagram.at(facet, 0.5 * (diagram.barycentric[middle] + diagram.barycentric[diagram.following[middle]]))
+    points = diagram.at(facet, 0.5 * (diagram.barycentric[middle] + diagram.barycentric[diagram.following[middle]]))
+    facet = diagram.facet[diagram.polygon_of[segments]]
+    for vertex, side in (
+        (segments, diagram.label[diagram.previous[segments]]),
+        (diagram.following[segments], diagram.label[diagram.following[segments]]),
+    ):
+        ends = np.flatnonzero((side < 0) & (face_neighbours[facet, -1 - np.minimum(side, -1)] < 0))
+        points[chain[segments[ends]]] = diagram.at(facet[ends], diagram.barycentric[vertex[ends]])
+    return points

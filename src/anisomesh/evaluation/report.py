@@ -7,6 +7,7 @@ from typing import Any
 
 import numpy as np
 
+from anisomesh.evaluation.boundary import BoundaryDistance, boundary_distance
 from anisomesh.evaluation.distance import SurfaceDistance, surface_distance
 from anisomesh.evaluation.intersections import self_intersections
 from anisomesh.evaluation.preservation import FeaturePreservation, feature_preservation
@@ -39,6 +40,8 @@ class Evaluation:
         Triangle quality in the paper's metric of the reference, angles, edge lengths.
     features
         Creases and corners of the reference that the remesh has.
+    boundary
+        Distances between the boundary curves, a the reference and b the remesh; None where one has none.
     validity
         Topology and flipped triangles.
     self_intersections, self_intersections_reference
@@ -54,6 +57,7 @@ class Evaluation:
     vertex_max: float
     shape: ShapeStatistics
     features: FeaturePreservation
+    boundary: BoundaryDistance | None
     validity: Validity
     self_intersections: int
     self_intersections_reference: int
@@ -68,6 +72,7 @@ class Evaluation:
             "distance": {**self.distance.as_dict(), "vertex_rms": self.vertex_rms, "vertex_max": self.vertex_max},
             "shape": self.shape.as_dict(),
             "features": self.features.as_dict(),
+            "boundary": self.boundary.as_dict() if self.boundary is not None else None,
             "validity": self.validity.as_dict(),
             "self_intersections": self.self_intersections,
             "self_intersections_reference": self.self_intersections_reference,
@@ -131,6 +136,7 @@ def evaluate(
         vertex_max=float(np.sqrt(squared.max())),
         shape=shape_statistics(b, quality_on(closest, b)),
         features=feature_preservation(a, b, crease_angle=crease_angle),
+        boundary=boundary_distance(a, b),
         validity=check_validity(b, a),
         self_intersections=len(self_intersections(b)),
         self_intersections_reference=len(self_intersections(a)),

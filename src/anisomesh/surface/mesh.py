@@ -9,7 +9,17 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from anisomesh._arrays import EdgeIndices, Edges, FaceIndices, Faces, FaceScalars, FaceVectors, Points, PointVectors
+from anisomesh._arrays import (
+    EdgeIndices,
+    Edges,
+    FaceIndices,
+    Faces,
+    FaceScalars,
+    FaceVectors,
+    PointMask,
+    Points,
+    PointVectors,
+)
 from anisomesh.errors import MeshError
 from anisomesh.surface import geometry, topology
 
@@ -81,6 +91,13 @@ class Surface:
     def edge_faces(self) -> EdgeIndices:
         """The two faces at each edge (E, 2), the second -1 on the boundary; -1, -1 where not manifold."""
         return topology.edge_faces(self.face_edges, len(self.edges))
+
+    @cached_property
+    def on_boundary(self) -> PointMask:
+        """Which points (V,) are ends of an edge with one face."""
+        mask = np.zeros(self.n_points, dtype=bool)
+        mask[self.edges[self.edge_face_count == 1]] = True
+        return mask
 
     @cached_property
     def face_neighbours(self) -> FaceIndices:

@@ -1,0 +1,44 @@
+"""The dual at the boundary: cells with one arc each, and their vertices on the boundary."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from anisomesh._arrays import EmbeddedPoints, PointMask, Points, Sites
+from anisomesh.cvt.arcs import Arcs
+from anisomesh.dual.cells import Cells
+from anisomesh.surface.boundary import BoundaryCurves
+
+MIN_ARCS = 3  # of a boundary curve, so that the dual has a loop there
+_AT_PLACE = 0.25  # of the length of an arc: a site so near to the middle of the arc holds it
+
+
+def sites_for_arcs(arcs: Arcs, curves: BoundaryCurves, cells: Cells, sites: Sites) -> EmbeddedPoints:
+    """Return points of the boundary (n, d) that are missing as sites.
+
+    A component of a cell with several arcs would pinch the dual, and a boundary curve of fewer than three arcs has no
+    loop in it. New sites go to the arcs of such a cell that its site is not on, and on such a curve to the quarter
+    points of its longest arc, and to corners that share their arc with others.
+    """
+    component = cells.of_polygon[arcs.polygon]
+    several = np.bincount(component, minlength=len(cells.site))[component] > 1
+    distance = np.linalg.norm(sites[arcs.site] - arcs.place, axis=1)
+    torn = np.flatnonzero(several & (distance > _AT_PLACE * arcs.length))
+    few = np.flatnonzero(np.bincount(arcs.curve, minlength=curves.n_curves) < MIN_ARCS)
+    order = np.lexsort((arcs.length, arcs.curve))
+    longest = order[np.searchsorted(arcs.curve[order], few, side="right") - 1]
+    quarters = [curves.at(arcs.start[longest] + share * arcs.length[longest], few) for share in (0.25, 0.75)]
+    return np.concatenate([arcs.place[torn], *quarters, arcs.second])
+
+
+def put_on_boundary(points: Points, arcs: Arcs, cells: Cells) -> tuple[Points, PointMask]:
+    """Return the vertices of the dual (V, d), those of cells at the boundary on their arcs, and which these are (V,).
+
+    The vertex goes to the sharpest corner in the arc, or else to the middle of it; of several arcs the longest counts.
+    """
+    component = cells.of_polygon[arcs.polygon]
+    order = np.argsort(arcs.length, kind="stable")
+    moved, mask = np.array(points), np.zeros(len(points), dtype=bool)
+    moved[component[order]] = arcs.place[order]
+    mask[component] = True
+    return moved, mask
