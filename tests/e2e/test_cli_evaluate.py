@@ -29,7 +29,7 @@ def test_json_is_strict_and_complete(run_cli, files):
     done = run_cli("evaluate", files / "reference.ply", files / "ball.off", "--samples", 200, "--json")
     facts = json.loads(done.stdout, parse_constant=pytest.fail)
     assert done.returncode == 0
-    assert set(facts) >= {"sampled", "floor", "distance", "shape", "features", "validity", "self_intersections"}
+    assert set(facts) >= {"sampled", "floor", "distance", "shape", "features", "validity", "boundary"}
     assert facts["sampled"]["edge_f1"] >= 0.0
     assert facts["features"]["corners"] == 8
 

@@ -33,7 +33,7 @@ def test_a_mesh_against_itself(surface):
     assert evaluation.features.corners_kept == evaluation.features.corners
     assert evaluation.validity.euler == evaluation.validity.euler_input
     assert evaluation.validity.flipped == 0
-    assert evaluation.self_intersections == evaluation.self_intersections_reference == 0
+    assert evaluation.validity.self_intersections == evaluation.validity.self_intersections_input == 0
     assert all(np.isfinite(number) for number in numbers(evaluation.as_dict()))
     json.dumps(evaluation.as_dict(), allow_nan=False)
 
@@ -78,7 +78,7 @@ def test_defects_of_the_result_are_found():
     assert (opened.validity.closed, opened.validity.boundary_loops) == (False, 1)
     pushed = reference.points.copy()
     pushed[0] *= -1.2  # through the other side
-    assert evaluate(reference, Surface(pushed, reference.faces), samples=100).self_intersections > 0
+    assert evaluate(reference, Surface(pushed, reference.faces), samples=100).validity.self_intersections > 0
 
 
 def test_a_reference_that_needs_repair_is_repaired():

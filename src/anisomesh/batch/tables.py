@@ -60,7 +60,7 @@ def faults(row: Row) -> list[str]:
         found.append("not oriented")
     if validity["euler"] != validity["euler_input"]:
         found.append(f"Euler {validity['euler']} for {validity['euler_input']}")
-    if row["evaluation"]["self_intersections"] > row["evaluation"]["self_intersections_reference"]:
+    if validity["self_intersections"] > validity["self_intersections_input"]:
         found.append("new self-intersections")
     return found
 

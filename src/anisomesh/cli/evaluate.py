@@ -97,5 +97,5 @@ def _boundary(evaluation: Evaluation) -> str:
 
 
 def _crossing(evaluation: Evaluation) -> str:
-    pairs = counted(evaluation.self_intersections, "pair of triangles", "pairs of triangles")
-    return f"{pairs} (reference {evaluation.self_intersections_reference:,})"
+    pairs = counted(evaluation.validity.self_intersections, "pair of triangles", "pairs of triangles")
+    return f"{pairs} (reference {evaluation.validity.self_intersections_input:,})"

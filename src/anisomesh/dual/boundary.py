@@ -13,7 +13,7 @@ MIN_ARCS = 3  # of a boundary curve, so that the dual has a loop there
 _AT_PLACE = 0.25  # of the length of an arc: a site so near to the middle of the arc holds it
 
 
-def sites_for_arcs(arcs: Arcs, curves: BoundaryCurves, cells: Cells, sites: Sites) -> EmbeddedPoints:
+def points_on_boundary(arcs: Arcs, curves: BoundaryCurves, cells: Cells, sites: Sites) -> EmbeddedPoints:
     """Return points of the boundary (n, d) that are missing as sites.
 
     A component of a cell with several arcs would pinch the dual, and a boundary curve of fewer than three arcs has no

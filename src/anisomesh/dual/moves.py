@@ -16,16 +16,19 @@ _SWEEPS = 10
 
 Ints = npt.NDArray[np.int64]
 Places = Callable[[Surface, int, Ints, ClosestPoints], Points]
+Mended = tuple[Points, Faces] | None
+Failed = set[tuple[str, bytes]]
+"""Names of mends, and the places of what they were tried on in vain: it need not be tried again as it is."""
 
 
-def to_average(surface: Surface, turned: FaceMask, reference: ClosestPoints) -> tuple[Points, Faces] | None:
+def to_average(surface: Surface, turned: FaceMask, reference: ClosestPoints, failed: Failed) -> Mended:
     """Return the mesh after moves of points to the average of their neighbours that leave fewer turned triangles."""
-    return _move(surface, turned, reference, _averages)
+    return _move(surface, turned, reference, failed, _averages)
 
 
-def nudge(surface: Surface, turned: FaceMask, reference: ClosestPoints) -> tuple[Points, Faces] | None:
+def nudge(surface: Surface, turned: FaceMask, reference: ClosestPoints, failed: Failed) -> Mended:
     """Return the mesh after small moves of points that leave fewer turned triangles, None if there is none."""
-    return _move(surface, turned, reference, _nudges)
+    return _move(surface, turned, reference, failed, _nudges)
 
 
 def wander(surface: Surface, turned: FaceMask, reference: ClosestPoints, rng: np.random.Generator) -> Points:
@@ -48,13 +51,14 @@ def wander(surface: Surface, turned: FaceMask, reference: ClosestPoints, rng: np
     return surface.points
 
 
-def relax(surface: Surface, turned: FaceMask, reference: ClosestPoints) -> tuple[Points, Faces] | None:
+def relax(surface: Surface, turned: FaceMask, reference: ClosestPoints, failed: Failed) -> Mended:
     """Return the mesh after sweeps of smoothing around the turned triangles, None if none of them helps."""
     near = np.zeros(surface.n_points, dtype=bool)
     near[surface.faces[turned]] = True
     near[surface.faces[near[surface.faces].any(axis=1)]] = True
     near &= ~surface.on_boundary
-    if not near.any():
+    key = "relax", surface.points[near].tobytes()
+    if not near.any() or key in failed:
         return None
     rows, columns = np.concatenate([surface.edges, surface.edges[:, ::-1]]).T
     rows, columns = rows[near[rows]], columns[near[rows]]
@@ -68,25 +72,24 @@ def relax(surface: Surface, turned: FaceMask, reference: ClosestPoints) -> tuple
         points[near] = np.einsum("nc,ncx->nx", weights, corners)
         if reference.turned(points[surface.faces[around]]).sum() < turned.sum():
             return points, surface.faces
+    failed.add(key)
     return None
 
 
-def _move(
-    surface: Surface, turned: FaceMask, reference: ClosestPoints, places_of: Places
-) -> tuple[Points, Faces] | None:
+def _move(surface: Surface, turned: FaceMask, reference: ClosestPoints, failed: Failed, places_of: Places) -> Mended:
     """Return the mesh after moves to other places that leave fewer turned triangles, None if there is none."""
     points = surface.points.copy()
-    faces_at: dict[int, list[int]] = {}
     candidates = np.unique(surface.faces[turned])
     candidates = candidates[~surface.on_boundary[candidates]]
-    for face in np.flatnonzero(np.isin(surface.faces, candidates).any(axis=1)).tolist():
-        for point in surface.faces[face].tolist():
-            faces_at.setdefault(point, []).append(face)
+    around_point = faces_around(surface, candidates)
     blocked: set[int] = set()
     for point in candidates.tolist():
-        around = np.array(faces_at[point])
+        around = around_point[point]
         ring = np.setdiff1d(surface.faces[around], [point])
         if blocked & {point, *ring.tolist()}:
+            continue
+        key = places_of.__name__, np.concatenate([points[point], points[surface.faces[around]].ravel()]).tobytes()
+        if key in failed:
             continue
         places = places_of(surface, point, ring, reference)
         count = _turned_after(points, surface.faces[around], point, places, reference)
@@ -94,7 +97,20 @@ def _move(
         if count[best] < turned[around].sum():
             points[point] = places[best]
             blocked |= {point, *ring.tolist()}
+        else:
+            failed.add(key)
     return (points, surface.faces) if blocked else None
+
+
+def faces_around(surface: Surface, points: npt.NDArray[np.integer]) -> dict[int, Ints]:
+    """Return the faces at each of these points (n,)."""
+    wanted = np.zeros(surface.n_points, dtype=bool)
+    wanted[points] = True
+    corner = np.flatnonzero(wanted[surface.faces.ravel()])
+    point = surface.faces.ravel()[corner]
+    order = np.argsort(point, kind="stable")
+    names, first = np.unique(point[order], return_index=True)
+    return dict(zip(names.tolist(), np.split(corner[order] // 3, first[1:]), strict=True))
 
 
 def _turned_after(points: Points, faces: Faces, point: int, places: Points, reference: ClosestPoints) -> Ints:

@@ -5,16 +5,16 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-import numpy.typing as npt
 
-from anisomesh._arrays import EmbeddedPoints, Faces, Points, PointTensors, Sites
+from anisomesh._arrays import Faces, Points, PointTensors, Sites
 from anisomesh.cvt.arcs import Boundary
 from anisomesh.cvt.diagram import Diagram
 from anisomesh.cvt.voronoi import RestrictedVoronoi
-from anisomesh.dual.boundary import put_on_boundary, sites_for_arcs
+from anisomesh.dual.boundary import points_on_boundary, put_on_boundary
 from anisomesh.dual.cells import Cells, cells_of
 from anisomesh.dual.decimate import decimate
 from anisomesh.dual.flip import flip_for_shape
+from anisomesh.dual.insert import points_in_cells, points_in_components
 from anisomesh.dual.place import crease_positions, creased_cells, snap_to_missed
 from anisomesh.dual.simplicial import simplicial_mesh
 from anisomesh.dual.triangulate import dual_mesh
@@ -94,11 +94,12 @@ def refine(
 
     Notes
     -----
-    1. While a cell is no disk, new sites go where it is farthest from its site; nothing else moves, so little else
-       breaks. The rounds are bounded; in practice one or two are enough.
-    2. When all cells are disks the dual, glued along bisector chains, is homeomorphic to the surface (a regular
-       cell complex; compare the closed ball property of Edelsbrunner and Shah 1997). Points on edges that occur
-       twice make it a simplicial mesh.
+    1. While a cell is no disk, new sites go where it is farthest from its site; also where a closed component has
+       fewer than four cells, where a cell has two arcs of the boundary, and where a boundary curve has fewer than
+       three. Nothing else moves, so little else breaks. The rounds are bounded; in practice one or two are enough.
+    2. When all cells are disks with at most one arc the dual, glued along bisector chains, is homeomorphic to the
+       surface (a regular cell complex; compare the closed ball property of Edelsbrunner and Shah 1997). Points on edges
+       that occur twice make it a simplicial mesh.
     3. What this inserted is taken away by edge collapses with the link condition, cheapest first.
     4. Triangles that face away from the surface are turned back by edge flips and moves.
     5. Edges are flipped where that gives better triangles in the metric.
@@ -113,10 +114,16 @@ def refine(
         cells = cells_of(diagram, surface.face_neighbours, voronoi.facets.area)
         bad = cells.euler != 1
         arcs = boundary.arcs(diagram)
-        missing = sites_for_arcs(arcs, boundary.curves, cells, sites)
-        if not (bad.any() or len(missing)) or bad.mean() > MAX_SHARE:
+        missing = np.concatenate(
+            [
+                points_in_cells(diagram, cells, bad),
+                points_in_components(diagram, cells, surface),
+                points_on_boundary(arcs, boundary.curves, cells, sites),
+            ]
+        )
+        if len(missing) == 0 or bad.mean() > MAX_SHARE:
             break
-        sites = np.concatenate([sites, _inside(diagram, cells, bad), missing])
+        sites = np.concatenate([sites, missing])
     from_input = bool(bad.any())
     if from_input:
         points, faces = voronoi.points, surface.faces
@@ -147,23 +154,3 @@ def refine(
         from_input=from_input,
         turned=turned,
     )
-
-
-def _inside(diagram: Diagram, cells: Cells, bad: npt.NDArray[np.bool_]) -> EmbeddedPoints:
-    """Return two points of each bad cell: the farthest from its site, and the farthest from both (n, d)."""
-    component = cells.of_polygon[diagram.polygon_of]
-    vertex = np.flatnonzero(bad[component])
-    component = component[vertex]
-    polygon = diagram.polygon_of[vertex]
-    position = diagram.at(diagram.facet[polygon], diagram.barycentric[vertex])
-    centre = diagram.sites[diagram.site[polygon]]
-    distance = np.linalg.norm(position - centre, axis=1)
-    chosen = []
-    for _ in range(2):
-        order = np.lexsort((-distance, component))
-        names, first = np.unique(component[order], return_index=True)
-        best = order[first]
-        chosen.append(position[best])
-        to_best = np.linalg.norm(position - position[best][np.searchsorted(names, component)], axis=1)
-        distance = np.minimum(distance, to_best)
-    return np.concatenate(chosen)

@@ -10,7 +10,7 @@ import numpy.typing as npt
 from anisomesh._arrays import FaceMask, Faces, Points
 from anisomesh.dual.decimate import collapsible_edges
 from anisomesh.dual.flip import do_flips, possible_flips
-from anisomesh.dual.moves import nudge, relax, to_average, wander
+from anisomesh.dual.moves import Failed, Mended, faces_around, nudge, relax, to_average, wander
 from anisomesh.surface import geometry
 from anisomesh.surface.closest import ClosestPoints
 from anisomesh.surface.mesh import Surface
@@ -18,8 +18,6 @@ from anisomesh.surface.mesh import Surface
 MAX_ROUNDS = 100
 _MAX_WANDERS = 40
 _LIFTS = (0.0, 0.1, 0.25, 0.5, 1.0)  # trial heights over an edge, in edge lengths
-
-Mended = tuple[Points, Faces] | None
 
 
 def untangle(points: Points, faces: Faces, reference: ClosestPoints) -> tuple[Points, Faces, int]:
@@ -49,6 +47,7 @@ def untangle(points: Points, faces: Faces, reference: ClosestPoints) -> tuple[Po
     """
     best = points, faces, len(faces) + 1
     rng = np.random.default_rng(0)
+    failed: Failed = set()
     wanders = 0
     for _ in range(MAX_ROUNDS):
         surface = Surface(points, faces)
@@ -59,7 +58,7 @@ def untangle(points: Points, faces: Faces, reference: ClosestPoints) -> tuple[Po
         if left == 0:
             break
         for mend in (_flip, to_average, nudge, _collapse, _split, relax):
-            mended: Mended = mend(surface, turned, reference)
+            mended: Mended = mend(surface, turned, reference, failed)
             if mended is not None:
                 points, faces = mended
                 break
@@ -71,7 +70,7 @@ def untangle(points: Points, faces: Faces, reference: ClosestPoints) -> tuple[Po
     return best
 
 
-def _flip(surface: Surface, turned: FaceMask, reference: ClosestPoints) -> Mended:
+def _flip(surface: Surface, turned: FaceMask, reference: ClosestPoints, failed: Failed) -> Mended:
     """Return the mesh after edge flips that leave fewer turned triangles, None if there is none."""
     flips = possible_flips(surface, np.unique(surface.face_edges[turned]))
     corners = surface.points[flips.triangles].reshape(-1, 3, 3)
@@ -82,38 +81,51 @@ def _flip(surface: Surface, turned: FaceMask, reference: ClosestPoints) -> Mende
     return (surface.points, do_flips(surface.faces, flips, order)) if len(order) else None
 
 
-def _collapse(surface: Surface, turned: FaceMask, reference: ClosestPoints) -> Mended:
+def _collapse(surface: Surface, turned: FaceMask, reference: ClosestPoints, failed: Failed) -> Mended:
     """Return the mesh after one collapse that leaves fewer turned triangles, None if there is none."""
     edges = np.unique(surface.face_edges[turned])
     edges = edges[collapsible_edges(surface)[edges] & (surface.edge_face_count[edges] == 2)]
-    best: tuple[int, Faces] | None = None
+    around_point = faces_around(surface, np.unique(surface.edges[edges]))
     for gone, into in np.concatenate([surface.edges[edges], surface.edges[edges][:, ::-1]]).tolist():
-        around = (surface.faces == gone).any(axis=1)
+        around = around_point[gone]
+        key = "collapse", surface.points[[gone, into, *surface.faces[around].ravel()]].tobytes()
+        if key in failed:
+            continue
         changed = np.where(surface.faces[around] == gone, into, surface.faces[around])
         changed = changed[(changed != np.roll(changed, 1, axis=1)).all(axis=1)]
-        gain = int(turned[around].sum() - reference.turned(surface.points[changed]).sum())
-        if gain > 0 and (best is None or gain > best[0]):
-            faces = np.concatenate([surface.faces[~around], changed]).astype(np.int32)
-            best = gain, (faces - (faces > gone)).astype(np.int32)
-            points = np.delete(surface.points, gone, axis=0)
-    return (points, best[1]) if best is not None else None
+        if reference.turned(surface.points[changed]).sum() < turned[around].sum():
+            faces = np.concatenate([np.delete(surface.faces, around, axis=0), changed]).astype(np.int32)
+            return np.delete(surface.points, gone, axis=0), (faces - (faces > gone)).astype(np.int32)
+        failed.add(key)
+    return None
 
 
-def _split(surface: Surface, turned: FaceMask, reference: ClosestPoints) -> Mended:
-    """Return the mesh with a point more, in a face or on an edge, that leaves fewer turned triangles, or None."""
-    best: tuple[int, Points, Faces] | None = None
-    m = surface.n_points
+def _split(surface: Surface, turned: FaceMask, reference: ClosestPoints, failed: Failed) -> Mended:
+    """Return the mesh with points more, in faces or on edges, that leave fewer turned triangles, or None."""
+    points, faces = list(surface.points), surface.faces.copy()
+    kept, taken = np.ones(len(faces), dtype=bool), np.zeros(len(faces), dtype=bool)
+    added: list[npt.NDArray[np.int32]] = []
     for gone, loop, start, lift in _stars(surface, turned):
+        key = f"split {turned[gone].tolist()}", surface.points[loop].tobytes()
+        if taken[gone].any() or key in failed:
+            continue
         facet, weights = reference.locate(start + np.outer(_LIFTS, lift))
         places = np.einsum("nc,ncx->nx", weights, reference.surface.points[reference.surface.faces[facet]])
-        new = np.array([[u, v, m] for u, v in zip(loop, loop[1:] + loop[:1], strict=True)])
-        for place in places:
-            points = np.concatenate([surface.points, place[None]])
-            gain = int(turned[gone].sum() - reference.turned(points[new]).sum())
-            if gain > 0 and (best is None or gain > best[0]):
-                faces = np.concatenate([np.delete(surface.faces, gone, axis=0), new]).astype(np.int32)
-                best = gain, points, faces
-    return best[1:] if best is not None else None
+        ring = surface.points[[[u, v] for u, v in zip(loop, loop[1:] + loop[:1], strict=True)]]
+        trials = np.stack(
+            [np.concatenate([ring, np.broadcast_to(place, (len(loop), 1, 3))], axis=1) for place in places]
+        )
+        count = reference.turned(trials.reshape(-1, 3, 3)).reshape(len(places), -1).sum(axis=1)
+        best = int(np.argmin(count))
+        if count[best] >= turned[gone].sum():
+            failed.add(key)
+            continue
+        new = [[u, v, len(points)] for u, v in zip(loop, loop[1:] + loop[:1], strict=True)]
+        added.append(np.array(new, dtype=np.int32))
+        points.append(places[best])
+        kept[gone] = False
+        taken[gone] = True
+    return (np.array(points), np.concatenate([faces[kept], *added])) if added else None
 
 
 def _stars(

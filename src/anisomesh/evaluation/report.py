@@ -9,7 +9,6 @@ import numpy as np
 
 from anisomesh.evaluation.boundary import BoundaryDistance, boundary_distance
 from anisomesh.evaluation.distance import SurfaceDistance, surface_distance
-from anisomesh.evaluation.intersections import self_intersections
 from anisomesh.evaluation.preservation import FeaturePreservation, feature_preservation
 from anisomesh.evaluation.quality import quality_on
 from anisomesh.evaluation.sampled import CREASE_ANGLE, DEFAULT_SAMPLES, SampledMeasures, sampled_measures
@@ -43,9 +42,7 @@ class Evaluation:
     boundary
         Distances between the boundary curves, a the reference and b the remesh; None where one has none.
     validity
-        Topology and flipped triangles.
-    self_intersections, self_intersections_reference
-        Pairs of triangles that intersect, in the remesh and in the reference.
+        Topology, flipped triangles and self-intersections.
     """
 
     vertices: int
@@ -59,8 +56,6 @@ class Evaluation:
     features: FeaturePreservation
     boundary: BoundaryDistance | None
     validity: Validity
-    self_intersections: int
-    self_intersections_reference: int
 
     def as_dict(self) -> dict[str, Any]:
         """Return everything as nested dictionaries of numbers, for JSON."""
@@ -74,8 +69,6 @@ class Evaluation:
             "features": self.features.as_dict(),
             "boundary": self.boundary.as_dict() if self.boundary is not None else None,
             "validity": self.validity.as_dict(),
-            "self_intersections": self.self_intersections,
-            "self_intersections_reference": self.self_intersections_reference,
         }
 
 
@@ -138,6 +131,4 @@ def evaluate(
         features=feature_preservation(a, b, crease_angle=crease_angle),
         boundary=boundary_distance(a, b),
         validity=check_validity(b, a),
-        self_intersections=len(self_intersections(b)),
-        self_intersections_reference=len(self_intersections(a)),
     )

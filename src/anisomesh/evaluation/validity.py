@@ -5,7 +5,10 @@ from __future__ import annotations
 from dataclasses import asdict, dataclass
 from typing import Any
 
+import numpy as np
+
 from anisomesh._arrays import FaceMask
+from anisomesh.evaluation.intersections import self_intersections
 from anisomesh.surface.closest import ClosestPoints
 from anisomesh.surface.mesh import Surface
 from anisomesh.surface.topology import (
@@ -26,27 +29,36 @@ class Validity:
     ----------
     closed
         Whether every edge has two faces.
-    boundary_loops, components
-        Their numbers.
-    euler, euler_input
-        Euler characteristic of the remesh and of the input.
+    boundary_loops, components, euler
+        Their numbers, and the Euler characteristic.
+    boundary_loops_input, components_input, euler_input
+        The same of the input.
+    duplicate_faces
+        Faces with the same three vertices as another.
     nonmanifold_edges, nonmanifold_vertices
         Edges with more than two faces; vertices whose faces do not form one fan.
     oriented
         Whether faces that share an edge agree on their side.
     flipped
         Number of triangles that face away from the input, see :func:`flipped_faces`.
+    self_intersections, self_intersections_input
+        Pairs of triangles that intersect, see :func:`~anisomesh.evaluation.intersections.self_intersections`.
     """
 
     closed: bool
     boundary_loops: int
+    boundary_loops_input: int
     components: int
+    components_input: int
     euler: int
     euler_input: int
+    duplicate_faces: int
     nonmanifold_edges: int
     nonmanifold_vertices: int
     oriented: bool
     flipped: int
+    self_intersections: int
+    self_intersections_input: int
 
     def as_dict(self) -> dict[str, Any]:
         """Return the values under their names, for JSON."""
@@ -66,13 +78,18 @@ def check_validity(result: Surface, reference: Surface) -> Validity:
     return Validity(
         closed=bool((result.edge_face_count == 2).all()),
         boundary_loops=len(boundary_loops(result.faces)),
+        boundary_loops_input=len(boundary_loops(reference.faces)),
         components=connected_components(result.faces, result.n_points)[0],
+        components_input=connected_components(reference.faces, reference.n_points)[0],
         euler=euler_characteristic(result.faces),
         euler_input=euler_characteristic(reference.faces),
+        duplicate_faces=result.n_faces - len(np.unique(np.sort(result.faces, axis=1), axis=0)),
         nonmanifold_edges=count_nonmanifold_edges(result.faces),
         nonmanifold_vertices=count_nonmanifold_points(result.faces),
         oriented=is_oriented(result.faces),
         flipped=int(flipped_faces(result, reference).sum()),
+        self_intersections=len(self_intersections(result)),
+        self_intersections_input=len(self_intersections(reference)),
     )
 
 

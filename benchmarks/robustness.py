@@ -1,0 +1,120 @@
+"""What the command line makes of every mesh of a folder: crashes, refusals, hangs, faults, new intersections.
+
+Usage: python benchmarks/robustness.py [--ratios 1 0.2 0.1] [--only NAME] [--folders wild zeroshot test] [--fresh]
+
+Rows are kept in benchmarks/out/robustness.jsonl; a run that was stopped goes on. Exit code 1 if a run crashed, hung,
+printed what it should not, or gave an invalid mesh without saying so.
+"""
+
+from __future__ import annotations
+
+import argparse
+import json
+import os
+import subprocess
+import sys
+import tempfile
+import time
+from collections import Counter
+from pathlib import Path
+from typing import Any
+
+import anisomesh
+
+OUT = Path(__file__).parent / "out" / "robustness.jsonl"
+LIMIT = 600  # seconds
+SAME = ("components", "euler", "boundary_loops")  # as in the input
+COUNTS = ("nonmanifold_edges", "nonmanifold_vertices", "flipped", "duplicate_faces")
+
+
+def run(path: Path, ratio: float) -> dict[str, Any]:
+    """Run the command on a mesh and return what it did."""
+    with tempfile.TemporaryDirectory() as folder:
+        out = Path(folder) / "out.ply"
+        words = ["remesh", str(path), "-o", str(out), "--ratio", str(ratio), "--json", "--quiet"]
+        command = [sys.executable, "-c", "from anisomesh.cli.main import run; run()", *words]
+        row: dict[str, Any] = {"mesh": f"{path.parent.name}/{path.name}", "ratio": ratio}
+        start = time.perf_counter()
+        try:
+            done = subprocess.run(command, capture_output=True, text=True, timeout=LIMIT, check=False)
+        except subprocess.TimeoutExpired:
+            return {**row, "outcome": "hang", "seconds": LIMIT}
+        row["seconds"] = round(time.perf_counter() - start, 2)
+        lines = done.stderr.strip().splitlines()
+        if done.returncode == 1 and len(lines) == 1 and not out.exists():
+            return {**row, "outcome": "refused", "said": lines[0].replace(str(path), path.name)}
+        if done.returncode != 0 or not out.exists():
+            return {**row, "outcome": "crash", "said": done.stderr[-500:]}
+        report = json.loads(done.stdout)
+        row |= {key: report[key] for key in ("vertices", "vertices_asked", "validity", "warnings")}
+        row["noise"] = done.stderr.strip()
+        anisomesh.load(out)  # it has to be readable
+    return {**row, "outcome": "done"}
+
+
+def faults(row: dict[str, Any]) -> list[str]:
+    """Return what is not valid about a result, in words."""
+    validity = row["validity"]
+    pairs = [(name, validity[name], validity[f"{name}_input"]) for name in SAME]
+    found = [f"{name} {value} for {wanted}" for name, value, wanted in pairs if value != wanted]
+    if validity["self_intersections"] > validity["self_intersections_input"]:
+        found.append(f"{validity['self_intersections']} pairs intersect for {validity['self_intersections_input']}")
+    found += [f"{name} {validity[name]}" for name in COUNTS if validity[name]]
+    return found if validity["oriented"] else [*found, "not oriented"]
+
+
+def main() -> int:
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("--ratios", type=float, nargs="+", default=[1.0, 0.2, 0.1])
+    parser.add_argument("--folders", nargs="+", default=["wild", "zeroshot", "test"])
+    parser.add_argument("--only", default="")
+    parser.add_argument("--fresh", action="store_true", help="forget earlier rows")
+    arguments = parser.parse_args()
+    data = Path(os.environ.get("ANISOMESH_DATA", ""))
+    paths = [path for folder in arguments.folders for path in sorted((data / folder).glob("*.*"))]
+    paths = [path for path in paths if arguments.only in path.name]
+    if not paths:
+        print("no meshes: set ANISOMESH_DATA to the folder of real meshes", file=sys.stderr)
+        return 2
+    OUT.parent.mkdir(exist_ok=True)
+    if arguments.fresh:
+        OUT.unlink(missing_ok=True)
+    rows = [json.loads(line) for line in OUT.read_text().splitlines()] if OUT.exists() else []
+    known = {(row["mesh"], row["ratio"]): row for row in rows}
+    chosen = []
+    for ratio in arguments.ratios:
+        for path in paths:
+            key = (f"{path.parent.name}/{path.name}", ratio)
+            if key not in known:
+                known[key] = run(path, ratio)
+                with OUT.open("a") as file:
+                    file.write(json.dumps(known[key]) + "\n")
+            row = known[key]
+            chosen.append(row)
+            said = faults(row) if row["outcome"] == "done" else [row.get("said", "")]
+            name = f"{row['mesh'][:50]:<50} {ratio:>5.0%}"
+            print(f"{name} {row['outcome']:<8} {row['seconds']:7.1f} s  {'; '.join(said)}", flush=True)
+    return _summary(chosen)
+
+
+def _summary(rows: list[dict[str, Any]]) -> int:
+    bad = 0
+    print("\n| folder | vertices | runs | refused | crashed | hung | with a fault | without a word | slowest |")
+    print("|---|---|---|---|---|---|---|---|---|")
+    for folder, ratio in dict.fromkeys((row["mesh"].split("/")[0], row["ratio"]) for row in rows):
+        group = [row for row in rows if row["mesh"].startswith(folder) and row["ratio"] == ratio]
+        count = Counter(row["outcome"] for row in group)
+        done = [row for row in group if row["outcome"] == "done"]
+        faulty = [row for row in done if faults(row)]
+        silent = [row for row in done if row["noise"] or (faults(row) and not row["warnings"])]
+        bad += count["crash"] + count["hang"] + len(silent)
+        slowest = max(row["seconds"] for row in group)
+        print(
+            f"| {folder} | {ratio:.0%} | {len(group)} | {count['refused']} | {count['crash']} | {count['hang']} "
+            f"| {len(faulty)} | {len(silent)} | {slowest:.0f} s |"
+        )
+    return 1 if bad else 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())

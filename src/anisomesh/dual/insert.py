@@ -1,0 +1,55 @@
+"""Points that are missing as sites for the dual to be a mesh with the topology of the surface."""
+
+from __future__ import annotations
+
+import numpy as np
+import numpy.typing as npt
+
+from anisomesh._arrays import EmbeddedPoints
+from anisomesh.cvt.diagram import Diagram
+from anisomesh.dual.cells import Cells
+from anisomesh.surface.mesh import Surface
+from anisomesh.surface.topology import connected_components
+
+MIN_CELLS = 4  # of a closed component: with three the dual is two triangles back to back, with fewer it has none
+
+
+def points_in_cells(diagram: Diagram, cells: Cells, bad: npt.NDArray[np.bool_]) -> EmbeddedPoints:
+    """Return two points of each cell that is ``bad`` (C,): farthest from its site, and farthest from both (n, d)."""
+    component = cells.of_polygon[diagram.polygon_of]
+    vertex = np.flatnonzero(bad[component])
+    component = component[vertex]
+    polygon = diagram.polygon_of[vertex]
+    position = diagram.at(diagram.facet[polygon], diagram.barycentric[vertex])
+    centre = diagram.sites[diagram.site[polygon]]
+    distance = np.linalg.norm(position - centre, axis=1)
+    chosen = []
+    for _ in range(2):
+        order = np.lexsort((-distance, component))
+        names, first = np.unique(component[order], return_index=True)
+        best = order[first]
+        chosen.append(position[best])
+        to_best = np.linalg.norm(position - position[best][np.searchsorted(names, component)], axis=1)
+        distance = np.minimum(distance, to_best)
+    return np.concatenate(chosen)
+
+
+def points_in_components(diagram: Diagram, cells: Cells, surface: Surface) -> EmbeddedPoints:
+    """Return points (n, d) of the closed components with fewer than four cells, so that they have four.
+
+    They are points of the surface, each the farthest from the sites there and those before it.
+    """
+    count, component = connected_components(surface.faces, surface.n_points)
+    cell_component = np.empty(len(cells.site), dtype=np.int64)
+    cell_component[cells.of_polygon] = component[diagram.facet]
+    n_cells = np.bincount(cell_component, minlength=count)
+    is_open = np.bincount(component, (surface.face_neighbours < 0).any(axis=1), minlength=count) > 0
+    chosen = []
+    for name in np.flatnonzero(~is_open & (n_cells < MIN_CELLS)).tolist():
+        points = diagram.points[np.unique(surface.faces[component == name])]
+        present = diagram.sites[cells.site[cell_component == name]]
+        distance = np.linalg.norm(points[:, None] - present[None], axis=2).min(axis=1)
+        for _ in range(MIN_CELLS - len(present)):
+            chosen.append(points[np.argmax(distance)])
+            distance = np.minimum(distance, np.linalg.norm(points - chosen[-1], axis=1))
+    return np.array(chosen).reshape(-1, diagram.points.shape[1])
