@@ -264,3 +264,5 @@ def _warnings(n: int, surface: Surface, refined: Refined, validity: Validity) ->
         yield f"the Euler characteristic is {validity.euler} instead of {validity.euler_input}; ask for more vertices"
     if validity.flipped:
         yield f"{validity.flipped:,} triangles are turned against the input surface"
+    if validity.new_intersections:
+        yield f"{validity.new_intersections:,} pairs of triangles intersect where the input does not"

@@ -6,7 +6,7 @@ import numpy as np
 import numpy.typing as npt
 from scipy.sparse import csr_array
 
-from anisomesh._arrays import Faces, Points
+from anisomesh._arrays import Faces, PointMask, Points
 from anisomesh.surface import geometry
 from anisomesh.surface.closest import ClosestPoints
 from anisomesh.surface.mesh import Surface
@@ -14,13 +14,16 @@ from anisomesh.surface.mesh import Surface
 _LENGTH_WEIGHT = 1e-3  # of the squared length against the squared distance to the planes
 _MIN_COSINE = 0.2  # a face turns by no more than this in one collapse
 _MIN_THICKNESS = 1e-3  # area over squared longest side of a face that a collapse may leave
-_BATCH = 0.1  # share of the collapses considered in one round
+_BATCHES = (0.1, 0.3, 1.0)  # shares of the collapses considered in one round, the larger where too few are possible
+_ENOUGH = 0.002  # of the points are a round worth while
 
 Floats = npt.NDArray[np.float64]
 Ints = npt.NDArray[np.int64]
 
 
-def decimate(points: Points, faces: Faces, n_points: int, reference: ClosestPoints) -> tuple[Points, Faces]:
+def decimate(
+    points: Points, faces: Faces, n_points: int, reference: ClosestPoints, *, kept: PointMask | None = None
+) -> tuple[Points, Faces]:
     """Collapse edges until no more than ``n_points`` points are left, or none can go.
 
     Parameters
@@ -31,6 +34,8 @@ def decimate(points: Points, faces: Faces, n_points: int, reference: ClosestPoin
         Number of points wanted.
     reference
         The surface that the mesh stands for; no collapse makes a face that is turned away from it.
+    kept
+        Points that do not go (V,).
 
     Returns
     -------
@@ -48,9 +53,10 @@ def decimate(points: Points, faces: Faces, n_points: int, reference: ClosestPoin
     quadrics = _quadrics(Surface(points, faces))
     surplus = len(points) - n_points
     refused = np.zeros(0, dtype=np.int64)
+    kept = kept if kept is not None else np.zeros(len(points), dtype=bool)
     while surplus > 0:
         surface = Surface(points, faces)
-        gone, into, refused = _collapses(surface, quadrics, surplus, reference, refused)
+        gone, into, refused = _collapses(surface, quadrics, surplus, reference, kept, refused)
         if len(gone) == 0:
             break
         around = np.unique(faces[np.isin(faces, gone).any(axis=1)])
@@ -88,7 +94,7 @@ def _quadrics(surface: Surface) -> Floats:
 
 
 def _collapses(
-    surface: Surface, quadrics: Floats, surplus: int, reference: ClosestPoints, refused: Ints
+    surface: Surface, quadrics: Floats, surplus: int, reference: ClosestPoints, kept: PointMask, refused: Ints
 ) -> tuple[Ints, Ints, Ints]:
     """Return points to remove and where each goes: cheap, allowed, and with neighbourhoods that do not touch.
 
@@ -96,7 +102,7 @@ def _collapses(
     """
     edges = surface.edges[collapsible_edges(surface)].astype(np.int64)
     gone, into = np.concatenate([edges, edges[:, ::-1]]).T
-    allowed = ~surface.on_boundary[gone] | surface.on_boundary[into]
+    allowed = ~kept[gone] & (~surface.on_boundary[gone] | surface.on_boundary[into])
     allowed &= ~np.isin(gone * surface.n_points + into, refused)
     gone, into = gone[allowed], into[allowed]
     place = np.concatenate([surface.points[into], np.ones((len(into), 1))], axis=1)
@@ -104,17 +110,22 @@ def _collapses(
     length2 = ((surface.points[gone] - surface.points[into]) ** 2).sum(axis=1)
     cost = np.einsum("ni,nij,nj->n", place, quadrics[gone], place) + _LENGTH_WEIGHT * area[gone] * length2
     order = np.argsort(cost, kind="stable")
-    for pool in (order[: max(int(_BATCH * len(order)), 64)], order):
+    enough = min(surplus, max(int(_ENOUGH * surface.n_points), 1))
+    chosen = order[:0]
+    for share in _BATCHES:
+        pool = order[: max(int(share * len(order)), 64)]
         good = pool[_keeps_normals(surface, gone[pool], into[pool])]
         while len(good):
             chosen = good[_apart(surface, gone[good], into[good])][:surplus]
             faithful = _faces_reference(surface, gone[chosen], into[chosen], reference)
-            bad, done = chosen[~faithful], chosen[faithful]
+            bad, chosen = chosen[~faithful], chosen[faithful]
             refused = np.concatenate([refused, gone[bad] * surface.n_points + into[bad]])
-            if len(done):
-                return gone[done], into[done], refused
+            if len(chosen) >= enough or len(bad) == 0:
+                break
             good = good[~np.isin(good, bad)]
-    return gone[:0], into[:0], refused
+        if len(chosen) >= enough:
+            break
+    return gone[chosen], into[chosen], refused
 
 
 def collapsible_edges(surface: Surface) -> npt.NDArray[np.bool_]:
@@ -164,12 +175,27 @@ def _faces_at(surface: Surface) -> csr_array:
 
 
 def _apart(surface: Surface, gone: Ints, into: Ints) -> npt.NDArray[np.bool_]:
-    """Return which collapses (n,), in order of preference, share no point with a neighbourhood of a better one."""
+    """Return collapses (n,), in order of preference, of which no two share a point of their neighbourhoods.
+
+    Those without a better one near by are taken, then again among the others, until there are no others.
+    """
     n = surface.n_points
     rows, columns = np.concatenate([surface.edges, surface.edges[:, ::-1]]).T
     ring = csr_array((np.ones(len(rows), dtype=np.int8), (rows, columns)), shape=(n, n))
     touched = csr_array(ring[gone] + ring[into])
-    which = np.repeat(np.arange(len(gone)), np.diff(touched.indptr))
-    best = np.full(n, len(gone))
-    np.minimum.at(best, touched.indices, which)
-    return np.asarray(np.bincount(which, best[touched.indices] < which, minlength=len(gone)) == 0)
+    which, point = np.repeat(np.arange(len(gone)), np.diff(touched.indptr)), touched.indices
+    chosen = np.zeros(len(gone), dtype=bool)
+    while len(which):
+        best = np.full(n, len(gone))
+        np.minimum.at(best, point, which)
+        first = np.ones(len(gone), dtype=bool)
+        first[which[best[point] < which]] = False
+        winner = np.unique(which[first[which]])
+        chosen[winner] = True
+        used = np.zeros(n, dtype=bool)
+        used[point[first[which]]] = True
+        blocked = np.zeros(len(gone), dtype=bool)
+        blocked[which[used[point]]] = True
+        left = ~blocked[which]
+        which, point = which[left], point[left]
+    return chosen

@@ -110,6 +110,8 @@ def faces_around(surface: Surface, points: npt.NDArray[np.integer]) -> dict[int,
     point = surface.faces.ravel()[corner]
     order = np.argsort(point, kind="stable")
     names, first = np.unique(point[order], return_index=True)
+    if len(names) == 0:
+        return {}
     return dict(zip(names.tolist(), np.split(corner[order] // 3, first[1:]), strict=True))
 
 

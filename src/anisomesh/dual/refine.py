@@ -16,6 +16,7 @@ from anisomesh.dual.decimate import decimate
 from anisomesh.dual.flip import flip_for_shape
 from anisomesh.dual.insert import points_in_cells, points_in_components
 from anisomesh.dual.place import crease_positions, creased_cells, snap_to_missed
+from anisomesh.dual.separate import separate
 from anisomesh.dual.simplicial import simplicial_mesh
 from anisomesh.dual.triangulate import dual_mesh
 from anisomesh.dual.untangle import untangle
@@ -26,6 +27,7 @@ from anisomesh.surface.features import sharp_edges
 from anisomesh.surface.mesh import Surface
 
 MAX_ROUNDS = 10
+_MAX_TRIMS = 3
 MAX_SHARE = 0.1  # of cells that are no disks; with more the sites are too few for this surface
 
 
@@ -47,6 +49,8 @@ class Refined:
         Whether the working surface itself was coarsened, because its embedding asks for many more sites.
     turned
         Triangles left that face away from the surface.
+    crossing
+        Pairs of triangles left that intersect where the surface does not.
     """
 
     points: Points
@@ -57,6 +61,7 @@ class Refined:
     removed: int
     from_input: bool
     turned: int
+    crossing: int
 
 
 def refine(
@@ -103,6 +108,8 @@ def refine(
     3. What this inserted is taken away by edge collapses with the link condition, cheapest first.
     4. Triangles that face away from the surface are turned back by edge flips and moves.
     5. Edges are flipped where that gives better triangles in the metric.
+    6. Triangles that intersect where the surface does not are taken apart; points that this takes are made up for by
+       collapses elsewhere.
 
     Where step 1 does not succeed (a tube thinner than the distance between sites) the working surface itself, which
     is valid, is coarsened by the same collapses. The paper inserts sites for every defect and optimises again;
@@ -144,6 +151,7 @@ def refine(
         space, faces, turned = untangle(space, faces, reference)
     roots = transfer_metric_roots(reference, metric_root(tensors), space)
     faces = flip_for_shape(space, faces, roots, reference)
+    space, faces, crossing = _without_crossings(space, faces, n_vertices, reference)
     return Refined(
         points=space,
         faces=faces,
@@ -153,4 +161,22 @@ def refine(
         removed=len(points) - len(space),
         from_input=from_input,
         turned=turned,
+        crossing=crossing,
     )
+
+
+def _without_crossings(
+    points: Points, faces: Faces, n_vertices: int, reference: ClosestPoints
+) -> tuple[Points, Faces, int]:
+    """Return the mesh with intersecting triangles taken apart, and back at no more points than before if possible."""
+    n_wanted = max(n_vertices, len(points))
+    points, faces, crossing = separate(points, faces, reference)
+    for _ in range(_MAX_TRIMS):
+        if len(points) <= n_wanted:
+            break
+        kept = np.arange(len(points)) >= n_wanted
+        coarser = separate(*decimate(points, faces, n_wanted, reference, kept=kept), reference)
+        if coarser[2] > crossing:
+            break
+        points, faces, crossing = coarser
+    return points, faces, crossing

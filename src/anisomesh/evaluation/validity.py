@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 
 from anisomesh._arrays import FaceMask
-from anisomesh.evaluation.intersections import self_intersections
+from anisomesh.evaluation.intersections import Pairs, self_intersections
 from anisomesh.surface.closest import ClosestPoints
 from anisomesh.surface.mesh import Surface
 from anisomesh.surface.topology import (
@@ -43,6 +43,8 @@ class Validity:
         Number of triangles that face away from the input, see :func:`flipped_faces`.
     self_intersections, self_intersections_input
         Pairs of triangles that intersect, see :func:`~anisomesh.evaluation.intersections.self_intersections`.
+    new_intersections
+        Those of the remesh that are not at an intersection of the input, see :func:`new_intersections`.
     """
 
     closed: bool
@@ -59,6 +61,7 @@ class Validity:
     flipped: int
     self_intersections: int
     self_intersections_input: int
+    new_intersections: int
 
     def as_dict(self) -> dict[str, Any]:
         """Return the values under their names, for JSON."""
@@ -90,7 +93,30 @@ def check_validity(result: Surface, reference: Surface) -> Validity:
         flipped=int(flipped_faces(result, reference).sum()),
         self_intersections=len(self_intersections(result)),
         self_intersections_input=len(self_intersections(reference)),
+        new_intersections=len(new_intersections(result, crossing_facets(reference))),
     )
+
+
+def crossing_facets(reference: Surface) -> ClosestPoints | None:
+    """Return the facets of a surface that intersect others, for :func:`new_intersections`, None if there are none."""
+    facets = np.unique(self_intersections(reference))
+    return ClosestPoints(Surface(reference.points, reference.faces[facets])) if len(facets) else None
+
+
+def new_intersections(result: Surface, crossing: ClosestPoints | None) -> Pairs:
+    """Return the pairs of faces (n, 2) of a remesh that intersect where its input does not.
+
+    A pair stands for an intersection of the input if both triangles are no farther than their longest edge from
+    the facets of the input that intersect others, ``crossing``.
+    """
+    pairs = self_intersections(result)
+    if len(pairs) == 0 or crossing is None:
+        return pairs
+    faces, place = np.unique(pairs, return_inverse=True)
+    corners = result.points[result.faces[faces]]
+    longest = np.linalg.norm(corners - corners[:, [1, 2, 0]], axis=2).max(axis=1)
+    near = np.sqrt(crossing.squared_distances(corners.mean(axis=1))) <= longest
+    return np.asarray(pairs[~near[place.reshape(-1, 2)].all(axis=1)])
 
 
 def flipped_faces(result: Surface, reference: Surface) -> FaceMask:
