@@ -9,7 +9,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from anisomesh._kernels import intersections as kernels
-from anisomesh.evaluation.intersections import self_intersections
+from anisomesh.surface.intersections import self_intersections
 from anisomesh.surface.mesh import Surface
 from anisomesh.surface.shapes import box, cylinder, open_patch, sphere, torus
 

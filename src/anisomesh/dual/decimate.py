@@ -137,7 +137,9 @@ def collapsible_edges(surface: Surface) -> npt.NDArray[np.bool_]:
     valence = np.diff(adjacency.indptr)
     across = surface.on_boundary[edges].all(axis=1) & (surface.edge_face_count == 2)
     tetrahedron = (valence[edges] == 3).all(axis=1)
-    return np.asarray((common == surface.edge_face_count) & ~across & ~tetrahedron)
+    lonely = np.zeros(len(edges), dtype=bool)
+    lonely[surface.face_edges[(surface.face_neighbours < 0).all(axis=1)]] = True  # a triangle that is a component
+    return np.asarray((common == surface.edge_face_count) & ~across & ~tetrahedron & ~lonely)
 
 
 def _keeps_normals(surface: Surface, gone: Ints, into: Ints) -> npt.NDArray[np.bool_]:

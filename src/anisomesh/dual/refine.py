@@ -28,7 +28,8 @@ from anisomesh.surface.mesh import Surface
 
 MAX_ROUNDS = 10
 _MAX_TRIMS = 3
-MAX_SHARE = 0.1  # of cells that are no disks; with more the sites are too few for this surface
+_TRIM_TRIES = 50
+MAX_SITES = 1.0  # per point of the surface; with more the surface itself is the simpler mesh to start from
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -128,10 +129,10 @@ def refine(
                 points_on_boundary(arcs, boundary.curves, cells, sites),
             ]
         )
-        if len(missing) == 0 or bad.mean() > MAX_SHARE:
+        if len(missing) == 0 or len(sites) + len(missing) > MAX_SITES * surface.n_points:
             break
         sites = np.concatenate([sites, missing])
-    from_input = bool(bad.any())
+    from_input = len(missing) > 0
     if from_input:
         points, faces = voronoi.points, surface.faces
     else:
@@ -175,7 +176,7 @@ def _without_crossings(
         if len(points) <= n_wanted:
             break
         kept = np.arange(len(points)) >= n_wanted
-        coarser = separate(*decimate(points, faces, n_wanted, reference, kept=kept), reference)
+        coarser = separate(*decimate(points, faces, n_wanted, reference, kept=kept), reference, max_tries=_TRIM_TRIES)
         if coarser[2] > crossing:
             break
         points, faces, crossing = coarser

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 import numpy as np
 import numpy.typing as npt
@@ -11,10 +11,10 @@ import numpy.typing as npt
 from anisomesh._arrays import Faces, Points
 from anisomesh.dual.flip import possible_flips
 from anisomesh.dual.moves import faces_around
-from anisomesh.evaluation.intersections import self_intersections
 from anisomesh.evaluation.validity import crossing_facets, new_intersections
 from anisomesh.surface import geometry
 from anisomesh.surface.closest import ClosestPoints
+from anisomesh.surface.intersections import self_intersections
 from anisomesh.surface.mesh import Surface
 
 MAX_ROUNDS = 30
@@ -36,7 +36,17 @@ class _Change:
     place: Floats | None = None
 
 
-def separate(points: Points, faces: Faces, reference: ClosestPoints) -> tuple[Points, Faces, int]:
+@dataclass
+class _Tries:
+    """How many more pairs may be looked at, and the pieces of meshes on which nothing helped."""
+
+    left: int
+    failed: set[bytes] = field(default_factory=set)
+
+
+def separate(
+    points: Points, faces: Faces, reference: ClosestPoints, *, max_tries: int = 300
+) -> tuple[Points, Faces, int]:
     """Mend pairs of triangles that intersect, where the reference does not, without changing the topology.
 
     Parameters
@@ -45,6 +55,8 @@ def separate(points: Points, faces: Faces, reference: ClosestPoints) -> tuple[Po
         An oriented manifold mesh (V, 3), (F, 3).
     reference
         The surface that it stands for.
+    max_tries
+        Pairs that are looked at, in all rounds together.
 
     Returns
     -------
@@ -62,14 +74,15 @@ def separate(points: Points, faces: Faces, reference: ClosestPoints) -> tuple[Po
     crossing = crossing_facets(reference.surface)
     best = points, faces, len(new_intersections(Surface(points, faces), crossing))
     splits = 0
+    tries = _Tries(max_tries)
     for _ in range(MAX_ROUNDS):
         surface = Surface(points, faces)
         pairs = new_intersections(surface, crossing).astype(np.int64)
         if len(pairs) < best[2]:
             best = points, faces, len(pairs)
-        changes = _changes(surface, pairs, reference, allow_equal=False)
+        changes = _changes(surface, pairs, reference, tries, allow_equal=False)
         if not changes and splits < _MAX_SPLITS:
-            changes = _changes(surface, pairs, reference, allow_equal=True)
+            changes = _changes(surface, pairs, reference, tries, allow_equal=True)
             splits += 1
         if not changes:
             break
@@ -77,7 +90,9 @@ def separate(points: Points, faces: Faces, reference: ClosestPoints) -> tuple[Po
     return best
 
 
-def _changes(surface: Surface, pairs: Ints, reference: ClosestPoints, *, allow_equal: bool) -> list[_Change]:
+def _changes(
+    surface: Surface, pairs: Ints, reference: ClosestPoints, tries: _Tries, *, allow_equal: bool
+) -> list[_Change]:
     """Return changes that mend pairs, no two of them near each other."""
     busy = np.zeros(surface.n_faces, dtype=bool)
     changes = []
@@ -87,8 +102,15 @@ def _changes(surface: Surface, pairs: Ints, reference: ClosestPoints, *, allow_e
             continue
         used, faces = np.unique(surface.faces[zone], return_inverse=True)
         local = Surface(surface.points[used], faces.reshape(-1, 3))
-        change = _best_change(local, np.searchsorted(zone, pair), reference, allow_equal)
-        if change is not None:
+        here = np.searchsorted(zone, pair)
+        key = b"".join((local.points.tobytes(), local.faces.tobytes(), here.tobytes(), bytes([allow_equal])))
+        if tries.left == 0 or key in tries.failed:
+            continue
+        tries.left -= 1
+        change = _best_change(local, here, reference, allow_equal)
+        if change is None:
+            tries.failed.add(key)
+        else:
             busy[zone] = True
             names = np.append(used, surface.n_points)  # the last stands for a new point
             point = int(names[change.point]) if change.place is not None else -1
@@ -121,6 +143,8 @@ def _best_change(surface: Surface, pair: Ints, reference: ClosestPoints, allow_e
         better = after < least or (allow_equal and best is None and after == least and change.point == surface.n_points)
         if better and _is_sound(surface, change, reference):
             least, best = after, change
+            if after == 0:
+                break
     return best
 
 
@@ -133,7 +157,9 @@ def _is_sound(surface: Surface, change: _Change, reference: ClosestPoints) -> bo
     old, new = surface.points[surface.faces[change.gone]], points[change.new]
     if geometry.thickness(new).min() < min(_MIN_THICKNESS, geometry.thickness(old).min()):
         return False
-    return bool(reference.turned(new).sum() <= reference.turned(old).sum())
+    if reference.turned(new).sum() > reference.turned(old).sum():
+        return False
+    return bool((~reference.clearly_facing(new)).sum() <= (~reference.clearly_facing(old)).sum())
 
 
 def _candidates(surface: Surface, pair: Ints, reference: ClosestPoints) -> Iterator[_Change]:

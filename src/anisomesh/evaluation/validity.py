@@ -8,8 +8,8 @@ from typing import Any
 import numpy as np
 
 from anisomesh._arrays import FaceMask
-from anisomesh.evaluation.intersections import Pairs, self_intersections
 from anisomesh.surface.closest import ClosestPoints
+from anisomesh.surface.intersections import Pairs, self_intersections
 from anisomesh.surface.mesh import Surface
 from anisomesh.surface.topology import (
     boundary_loops,
@@ -42,7 +42,7 @@ class Validity:
     flipped
         Number of triangles that face away from the input, see :func:`flipped_faces`.
     self_intersections, self_intersections_input
-        Pairs of triangles that intersect, see :func:`~anisomesh.evaluation.intersections.self_intersections`.
+        Pairs of triangles that intersect, see :func:`~anisomesh.surface.intersections.self_intersections`.
     new_intersections
         Those of the remesh that are not at an intersection of the input, see :func:`new_intersections`.
     """

@@ -7,15 +7,18 @@ from functools import cached_property
 import igl
 import numpy as np
 import numpy.typing as npt
+from scipy.sparse import csr_array
 
 from anisomesh._arrays import FaceMask, FaceVectors, Points
 from anisomesh.surface.geometry import corner_angles, unit
+from anisomesh.surface.intersections import self_intersections
 from anisomesh.surface.mesh import Surface
 
 _ON_SIDE = 1e-6
 _BLOCK = 16_384  # queries at a time, so that the memory in between is bounded
 _MARGIN = 0.01  # of the square root of twice the area of a triangle
 _CLEAR = 1e-3  # least cosine between normals that agree clearly
+_SAME_SHEET = 1e-7  # of the diagonal: sheets so near to each other lie on each other
 
 Vectors = npt.NDArray[np.float64]
 Rows = npt.NDArray[np.int64]
@@ -70,7 +73,8 @@ class ClosestPoints:
     def turned(self, corners: Vectors) -> FaceMask:
         """Return which triangles (n, 3, 3) face away from the surface where it is closest to their barycentre.
 
-        A triangle without area is not turned.
+        A triangle without area is not turned. Where two sheets of the surface lie on each other and face opposite
+        ways, one of them is enough.
         """
         normals = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
         return np.asarray(self._cosines(normals, corners.mean(axis=1)) < 0.0)
@@ -89,8 +93,25 @@ class ClosestPoints:
         return np.asarray(np.min(cosines, axis=0) > _CLEAR)
 
     def _cosines(self, normals: Vectors, queries: Vectors) -> npt.NDArray[np.float64]:
-        """Return the cosine (n,) between normals of any length and those of the surface closest to the queries."""
-        return np.asarray(np.einsum("nx,nx->n", unit(normals), unit(self.normals(queries))))
+        """Return the cosine (n,) between normals of any length and those of the surface closest to the queries.
+
+        Where a sheet of the surface lies on the closest one, the larger cosine.
+        """
+        facet, weights = self.locate(queries)
+        normals = unit(normals)
+        cosines = np.einsum("nx,nx->n", normals, unit(self.normals_at(facet, weights)))
+        against = np.flatnonzero(cosines < _CLEAR)
+        if len(against) == 0 or self._opposite.nnz == 0:
+            return np.asarray(cosines)
+        start, count = self._opposite.indptr[facet[against]], np.diff(self._opposite.indptr)[facet[against]]
+        which = np.repeat(against, count)
+        other = self._opposite.indices[np.repeat(start + count - np.cumsum(count), count) + np.arange(count.sum())]
+        place = np.einsum("nc,ncx->nx", weights[which], self.surface.points[self.surface.faces[facet[which]]])
+        there = squared_distances_to(self.surface.points[self.surface.faces[other]], place)
+        same = there <= (_SAME_SHEET * self.surface.diagonal) ** 2
+        found = np.einsum("nx,nx->n", normals[which], self.surface.face_normals[other])
+        np.maximum.at(cosines, which[same], found[same])
+        return np.asarray(cosines)
 
     def _query(self, queries: Vectors) -> tuple[npt.NDArray[np.float64], Rows, Vectors]:
         queries = np.ascontiguousarray(queries, dtype=np.float64).reshape(-1, 3)
@@ -98,6 +119,20 @@ class ClosestPoints:
             return np.zeros(0), np.zeros(0, dtype=np.int64), np.zeros((0, 3))
         squared, facet, closest = self._tree.squared_distance(self.surface.points, self._faces, queries)
         return np.asarray(squared), np.asarray(facet, dtype=np.int64), np.asarray(closest)
+
+    @cached_property
+    def _opposite(self) -> csr_array:
+        """Facets that lie on each facet and face the other way (F, F)."""
+        surface = self.surface
+        first, second = self_intersections(surface).T
+        normals, size = surface.face_normals, surface.n_faces
+        apart = surface.points[surface.faces[second]] - surface.points[surface.faces[first, 0]][:, None]
+        height = np.abs(np.einsum("ncx,nx->nc", apart, normals[first])).max(axis=1)
+        flat = (height <= _SAME_SHEET * surface.diagonal) & (
+            np.einsum("nx,nx->n", normals[first], normals[second]) < 0.0
+        )
+        rows, columns = np.concatenate([[first, second], [second, first]], axis=1)[:, np.tile(flat, 2)]
+        return csr_array((np.ones(len(rows), dtype=np.int8), (rows, columns)), shape=(size, size))
 
     @cached_property
     def _edge_normals(self) -> Vectors:
@@ -131,6 +166,21 @@ def barycentric(corners: npt.NDArray[np.float64], points: Points) -> npt.NDArray
     share = np.clip(np.divide(along, length, out=np.zeros_like(along), where=length > 0.0), 0.0, 1.0)
     weights[rows, start], weights[rows, end] = 1.0 - share, share
     return np.asarray(weights / weights.sum(axis=1, keepdims=True))
+
+
+def squared_distances_to(corners: Vectors, points: Vectors) -> npt.NDArray[np.float64]:
+    """Return the squared distance (n,) of points (n, 3) to triangles (n, 3, 3), one to one."""
+    sides = corners[:, [1, 2, 0]] - corners
+    to_point = points[:, None, :] - corners
+    length = np.einsum("ncx,ncx->nc", sides, sides)
+    share = np.einsum("ncx,ncx->nc", to_point, sides)
+    share = np.clip(np.divide(share, length, out=np.zeros_like(share), where=length > 0.0), 0.0, 1.0)
+    to_sides = to_point - share[:, :, None] * sides
+    squared = np.einsum("ncx,ncx->nc", to_sides, to_sides).min(axis=1)
+    normal = unit(np.cross(sides[:, 0], sides[:, 1]))
+    inside = (np.einsum("ncx,nx->nc", np.cross(sides, to_point), normal) >= 0.0).all(axis=1) & normal.any(axis=1)
+    height = np.einsum("nx,nx->n", to_point[:, 0], normal)
+    return np.asarray(np.where(inside, height**2, squared))
 
 
 def _summed(
