@@ -80,3 +80,18 @@ def test_a_scaled_embedding_comes_back_to_space():
     ordered = Surface(surface.points, scaled.faces)
     result = mended(scaled, 2.0 * sites, ordered, scale=2.0)
     np.testing.assert_allclose(np.linalg.norm(result.points, axis=1), 1.0, atol=0.1)
+
+
+def test_small_components_keep_their_shape_with_few_sites():
+    """Regression: a component with one or two sites had no triangle in the dual and went without a word."""
+    ball = shapes.sphere(1)
+    points = np.concatenate([0.2 * ball.points + [k, 0.0, 0.0] for k in range(8)])
+    faces = np.concatenate([ball.faces + k * ball.n_points for k in range(8)])
+    surface = Surface(points, faces)
+    voronoi = RestrictedVoronoi(surface.points, surface.faces)
+    for n in (1, 5, 12):
+        sites = naive.random_sites(surface.points, surface.faces, n, np.random.default_rng(n))
+        result = mended(voronoi, sites, Surface(surface.points, voronoi.faces))
+        assert_closed_manifold(result.faces, 16)
+        assert topology.connected_components(result.faces, len(result.points))[0] == 8
+        assert len(np.unique(np.sort(result.faces, axis=1), axis=0)) == len(result.faces)

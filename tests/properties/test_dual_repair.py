@@ -12,6 +12,7 @@ from anisomesh.dual.simplicial import simplicial_mesh
 from anisomesh.dual.triangulate import dual_mesh
 from anisomesh.dual.untangle import untangle
 from anisomesh.evaluation.validity import check_validity, flipped_faces
+from anisomesh.surface import topology
 from anisomesh.surface.closest import ClosestPoints
 from anisomesh.surface.features import corners, sharp_edges
 from anisomesh.surface.geometry import thickness
@@ -238,3 +239,14 @@ def cubes_boundary(cubes):
     points, index = np.unique(corners, axis=0, return_inverse=True)
     index = index.reshape(-1, 4)
     return Surface(points, np.concatenate([index[:, [0, 1, 2]], index[:, [0, 2, 3]]]))
+
+
+def test_a_component_of_one_triangle_is_not_collapsed():
+    """Regression: the link condition alone lets a triangle without neighbours go."""
+    ball = sphere(2)
+    points = np.concatenate([ball.points, [[3.0, 0, 0], [4, 0, 0], [3, 1, 0]]])
+    faces = np.concatenate([ball.faces, np.arange(ball.n_points, ball.n_points + 3, dtype=np.int32)[None]])
+    reference = ClosestPoints(Surface(points, faces))
+    _, coarse = decimate(points, faces, 10, reference)
+    assert topology.connected_components(coarse, coarse.max() + 1)[0] == 2
+    assert topology.euler_characteristic(coarse) == 3

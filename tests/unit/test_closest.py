@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from creases import wedge
 
-from anisomesh.surface.closest import ClosestPoints
+from anisomesh.surface.closest import ClosestPoints, squared_distances_to
 from anisomesh.surface.mesh import Surface
 from anisomesh.surface.shapes import box
 
@@ -42,3 +42,33 @@ def test_closest_points_on_flat_facets_are_found_along_the_longest_side():
     found = np.einsum("nc,ncx->nx", weights, points[surface.faces[facet]])
     np.testing.assert_allclose(found, [[3, 0, 0], [0.5, 0, 0], [0, 0, 0], [0, 5, 0]], atol=1e-12)
     np.testing.assert_allclose(weights.sum(axis=1), 1.0)
+
+
+def test_a_triangle_on_two_sheets_that_lie_on_each_other_faces_one_of_them():
+    """Regression: the facet found as closest was either, so half of the triangles of a good remesh were turned."""
+    lower = box(n=2)
+    upper = lower.points + [0.0, 0.0, 1.0]
+    touching = Surface(
+        np.concatenate([lower.points, upper]), np.concatenate([lower.faces, lower.faces + lower.n_points])
+    )
+    closest = ClosestPoints(touching)
+    between = np.array([[[0.1, 0.2, 1.0], [0.7, 0.3, 1.0], [0.4, 0.8, 1.0]]])
+    assert not closest.turned(between).any()
+    assert not closest.turned(between[:, ::-1]).any()
+    assert closest.clearly_facing(between).all()
+    outside = between + up
+    assert not closest.turned(outside).any()
+    assert closest.turned(outside[:, ::-1]).all()
+
+
+def test_distance_to_triangles_is_that_of_dense_samples():
+    rng = np.random.default_rng(0)
+    corners, points = rng.normal(size=(40, 3, 3)), rng.normal(size=(40, 3))
+    corners[:3, 2] = corners[:3, 1]  # flat ones
+    u, v = (table.ravel() for table in np.meshgrid(np.linspace(0, 1, 201), np.linspace(0, 1, 201)))
+    weights = np.stack([1 - u, u * (1 - v), u * v], axis=1)
+    samples = np.einsum("sc,ncx->nsx", weights, corners)
+    expected = np.linalg.norm(samples - points[:, None], axis=2).min(axis=1)
+    found = np.sqrt(squared_distances_to(corners, points))
+    assert np.all(found <= expected + 1e-12)
+    np.testing.assert_allclose(found, expected, atol=0.02)

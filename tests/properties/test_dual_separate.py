@@ -1,0 +1,97 @@
+"""Intersecting triangles are taken apart where the surface has no intersection, and left where it has."""
+
+import numpy as np
+import pytest
+from tests.reference.dual_cases import assert_closed_manifold
+
+from anisomesh.dual.separate import separate
+from anisomesh.evaluation.validity import check_validity, crossing_facets, new_intersections
+from anisomesh.pipeline import remesh
+from anisomesh.surface.closest import ClosestPoints
+from anisomesh.surface.intersections import self_intersections
+from anisomesh.surface.mesh import Surface
+from anisomesh.surface.shapes import box, sphere
+
+
+def both(a, b):
+    return Surface(np.concatenate([a.points, b.points]), np.concatenate([a.faces, b.faces + a.n_points]))
+
+
+def moved(surface, by):
+    return surface.with_points(surface.points + np.asarray(by))
+
+
+def sheets(n=6, gap=0.02):
+    """Return two thin boxes, one above the other, so near that a small move of a point makes them intersect."""
+    lower = box((1.0, 1.0, 0.1), n=n)
+    return both(lower, moved(lower, [0.0, 0.0, 0.1 + gap]))
+
+
+def dented(surface, seed, size, share=0.05):
+    rng = np.random.default_rng(seed)
+    points = surface.points.copy()
+    chosen = rng.choice(len(points), max(1, int(share * len(points))), replace=False)
+    points[chosen, 2] += rng.uniform(-size, size, len(chosen))
+    return surface.with_points(points)
+
+
+@pytest.mark.parametrize("seed", range(6))
+def test_points_that_reach_into_another_sheet_come_back(seed):
+    reference = sheets()
+    broken = dented(reference, seed, 0.06)
+    before = len(self_intersections(broken))
+    points, faces, left = separate(broken.points, broken.faces, ClosestPoints(reference))
+    assert left == len(self_intersections(Surface(points, faces)))
+    assert left == 0 or left < before
+    assert_closed_manifold(faces, 4)
+    assert check_validity(Surface(points, faces), reference).flipped <= check_validity(broken, reference).flipped
+
+
+def test_a_mesh_without_intersections_is_returned_as_it_is():
+    reference = sheets()
+    points, faces, left = separate(reference.points, reference.faces, ClosestPoints(reference))
+    assert left == 0
+    np.testing.assert_array_equal(points, reference.points)
+    np.testing.assert_array_equal(faces, reference.faces)
+
+
+def test_intersections_of_the_surface_itself_are_left():
+    crossing = both(sphere(2), moved(sphere(2), [0.9, 0.1, 0.2]))
+    assert len(self_intersections(crossing)) > 0
+    points, faces, left = separate(crossing.points, crossing.faces, ClosestPoints(crossing))
+    assert left == 0
+    np.testing.assert_array_equal(points, crossing.points)
+    np.testing.assert_array_equal(faces, crossing.faces)
+
+
+def test_new_intersections_are_those_away_from_the_old_ones():
+    crossing = both(sphere(2), moved(sphere(2), [1.5, 0.0, 0.0]))
+    facets = crossing_facets(crossing)
+    assert len(new_intersections(crossing, facets)) == 0
+    folded = crossing.points.copy()
+    far = int(np.argmin(folded[:, 0]))  # on the other side of the first sphere
+    folded[far] = [0.6, 0.0, 0.0]
+    pairs = new_intersections(crossing.with_points(folded), facets)
+    assert len(pairs) > 0
+    assert np.isin(far, crossing.faces[pairs])
+    assert crossing_facets(sphere(1)) is None
+
+
+def test_tries_are_bounded():
+    reference = sheets()
+    broken = dented(reference, 0, 0.06)
+    _, faces, left = separate(broken.points, broken.faces, ClosestPoints(reference), max_tries=0)
+    assert left == len(self_intersections(broken)) > 0
+    np.testing.assert_array_equal(faces, broken.faces)
+
+
+@pytest.mark.parametrize("gap", [0.03, 0.01, 0.003])
+def test_a_remesh_of_sheets_close_together_has_no_intersection(gap):
+    """Coarse triangles on curved shells as near to each other as a few per cent of their edges."""
+    outer = sphere(4)
+    inner = Surface((1.0 - gap) * outer.points, outer.faces[:, ::-1])
+    result = remesh(both(outer, inner), n_vertices=300, max_iterations=30)
+    assert result.validity.new_intersections == 0 or any("intersect" in text for text in result.warnings)
+    assert result.validity.euler == 4
+    if gap >= 0.01:
+        assert result.validity.new_intersections == 0
