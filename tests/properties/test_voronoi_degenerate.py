@@ -105,3 +105,18 @@ def test_naive_predicates_and_diagram_break_a_tie_alike():
     low, high = naive.perturbed(naive.table(surface.points, [0, 1, 2], sites), [0, 1])
     assert all(a > b for a, b in zip(low, high, strict=True))
     assert diagram.site.tolist() == [1]
+
+
+@pytest.mark.parametrize("seed", range(8))
+def test_sites_equally_far_from_a_tiny_surface(seed):
+    """Regression: the search tree rounds distances otherwise than the diagram, and gave a facet no owner for ever."""
+    surface = shapes.sphere(1)
+    rng = np.random.default_rng(seed)
+    sites = rng.normal(size=(60, 8))
+    sites /= np.linalg.norm(sites, axis=1)[:, None]
+    sites = np.concatenate([sites, sites])
+    points = np.zeros((surface.n_points, 8))
+    points[:, :3] = 1e-15 * surface.points
+    diagram = RestrictedVoronoi(points, surface.faces).diagram(sites)
+    assert np.isin(np.arange(surface.n_faces), diagram.facet).all()
+    assert diagram.site.min() >= 60

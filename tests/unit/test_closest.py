@@ -47,7 +47,8 @@ def test_closest_points_on_flat_facets_are_found_along_the_longest_side():
 def test_a_triangle_on_two_sheets_that_lie_on_each_other_faces_one_of_them():
     """Regression: the facet found as closest was either, so half of the triangles of a good remesh were turned."""
     lower = box(n=2)
-    upper = lower.points + [0.0, 0.0, 1.0]
+    up = np.array([0.0, 0.0, 1.0])
+    upper = lower.points + up
     touching = Surface(
         np.concatenate([lower.points, upper]), np.concatenate([lower.faces, lower.faces + lower.n_points])
     )

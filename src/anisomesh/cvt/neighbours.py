@@ -115,10 +115,12 @@ class NeighbourLists:
         return found
 
     def nearest(self, queries: Floats, sites: Sites) -> npt.NDArray[np.int32]:
-        """Return the site nearest to each point (n, d); ``sites`` as in the last call of ``table``."""
+        """Return the nearest site, of several the last, to each point (n, d); ``sites`` as in the last ``table``."""
         if self._current is None:
             self._current = cKDTree(sites)
-        return np.asarray(self._current.query(queries, workers=self._workers.threads)[1], dtype=np.int32)
+        found = np.asarray(self._current.query(queries, workers=self._workers.threads)[1], dtype=np.int32)
+        walk(queries, found, sites, self._start, self._counts, self._neighbours)  # the tree returns any of several
+        return found
 
     def _as_table(self, sites: Sites) -> clip.Sites:
         complete = self._radius - self._worn()
