@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 import time
 from collections.abc import Iterator
 from contextlib import contextmanager
@@ -37,6 +38,7 @@ EXCHANGE_AT = 0.6  # share of the iterations after which sites are exchanged
 DENSITY_SHARPNESS = 1.5  # sharpness of the energy that sites are distributed by, over that of the optimisation
 MAX_GROWTH = 8  # splitting makes at most so many times the faces, or MAX_SPLIT_FACES
 MAX_SPLIT_FACES = 60_000
+BYTES_PER_VERTEX, BYTES_PER_FACE = 6_000, 1_500  # of memory; measured with benchmarks/speed.py
 
 
 def remesh(
@@ -97,6 +99,7 @@ def remesh(
         unit = prepared.surface.with_points(frame.to_unit(prepared.surface.points))
         split = split_long_edges(unit, max_edge(unit, n), max_faces=max(MAX_GROWTH * unit.n_faces, MAX_SPLIT_FACES))
         working = split.surface
+        _check_memory(n, working.n_faces)
     with run.stage("metric"):
         wanted = options.metric
         if not isinstance(wanted, str):
@@ -115,6 +118,7 @@ def remesh(
             voronoi,
             optimised.sites,
             ordered,
+            unit,
             boundary,
             embedding.scale,
             n_vertices=n,
@@ -122,7 +126,7 @@ def remesh(
             tensors=metric.tensors,
         )
         surface = Surface(frame.to_model(refined.points), refined.faces)
-        validity = check_validity(surface, prepared.surface)
+        validity = check_validity(Surface(refined.points, refined.faces), unit)
     return RemeshResult(
         surface=surface,
         prepared=prepared.surface,
@@ -241,6 +245,18 @@ def _check_count(n_vertices: int | None, ratio: float | None) -> None:
         raise OptionError(f"ratio = {ratio}; expected a positive number, such as 0.2 for a fifth of the vertices")
 
 
+def _check_memory(n: int, n_faces: int) -> None:
+    """Refuse what cannot fit into the memory of this machine, before hours are spent on it."""
+    try:
+        there = os.sysconf("SC_PAGE_SIZE") * os.sysconf("SC_PHYS_PAGES")
+    except (AttributeError, ValueError, OSError):  # not a system that tells
+        return
+    needed = BYTES_PER_VERTEX * n + BYTES_PER_FACE * n_faces
+    if needed > there:
+        sizes = f"about {needed / 2**30:,.0f} GiB of memory, and this machine has {there / 2**30:,.0f}"
+        raise OptionError(f"{n:,} vertices need {sizes}; ask for fewer")
+
+
 def _even_edge(area: float, n: int) -> float:
     """Return the edge length of n vertices spread evenly in equilateral triangles over an area."""
     return float(np.sqrt(2.0 * area / (np.sqrt(3.0) * n)))
@@ -259,7 +275,8 @@ def _warnings(n: int, surface: Surface, refined: Refined, validity: Validity) ->
             "triangles do not follow the metric: ask for more vertices"
         )
     if abs(surface.n_points - n) > COUNT_TOLERANCE * n:
-        yield f"{surface.n_points:,} vertices instead of {n:,}: fewer would fold the surface or change its topology"
+        why = "fewer would fold the surface or change its topology" if surface.n_points > n else "it has no more"
+        yield f"{surface.n_points:,} vertices instead of {n:,}: {why}"
     if validity.euler != validity.euler_input:
         yield f"the Euler characteristic is {validity.euler} instead of {validity.euler_input}; ask for more vertices"
     if validity.flipped:

@@ -37,6 +37,7 @@ def mended(voronoi, sites, surface, scale=1.0, crease_angle=180.0):
         voronoi,
         sites,
         surface,
+        surface,
         Boundary(voronoi, surface, len(sites), crease_angle),
         scale,
         n_vertices=len(sites),

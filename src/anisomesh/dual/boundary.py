@@ -10,20 +10,19 @@ from anisomesh.dual.cells import Cells
 from anisomesh.surface.boundary import BoundaryCurves
 
 MIN_ARCS = 3  # of a boundary curve, so that the dual has a loop there
-_AT_PLACE = 0.25  # of the length of an arc: a site so near to the middle of the arc holds it
 
 
 def points_on_boundary(arcs: Arcs, curves: BoundaryCurves, cells: Cells, sites: Sites) -> EmbeddedPoints:
     """Return points of the boundary (n, d) that are missing as sites.
 
     A component of a cell with several arcs would pinch the dual, and a boundary curve of fewer than three arcs has no
-    loop in it. New sites go to the arcs of such a cell that its site is not on, and on such a curve to the quarter
+    loop in it. New sites go to the arcs of such a cell but the one nearest to its site, on such a curve to the quarter
     points of its longest arc, and to corners that share their arc with others.
     """
     component = cells.of_polygon[arcs.polygon]
-    several = np.bincount(component, minlength=len(cells.site))[component] > 1
     distance = np.linalg.norm(sites[arcs.site] - arcs.place, axis=1)
-    torn = np.flatnonzero(several & (distance > _AT_PLACE * arcs.length))
+    order = np.lexsort((distance, component))
+    torn = order[1:][component[order[1:]] == component[order[:-1]]]
     few = np.flatnonzero(np.bincount(arcs.curve, minlength=curves.n_curves) < MIN_ARCS)
     order = np.lexsort((arcs.length, arcs.curve))
     longest = order[np.searchsorted(arcs.curve[order], few, side="right") - 1]

@@ -29,7 +29,8 @@ from anisomesh.surface.mesh import Surface
 MAX_ROUNDS = 10
 _MAX_TRIMS = 3
 _TRIM_TRIES = 50
-MAX_SITES = 1.0  # per point of the surface; with more the surface itself is the simpler mesh to start from
+MAX_SHARE = 0.25  # of cells that are no disks; with more the sites are too few for this surface
+MAX_GROWTH, MAX_MORE = 4, 1_000  # the most sites are so many times the vertices asked for, and so many more
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -47,7 +48,7 @@ class Refined:
     removed
         Points taken away again by edge collapses.
     from_input
-        Whether the working surface itself was coarsened, because its embedding asks for many more sites.
+        Whether the surface itself was coarsened, because its embedding asks for many more sites.
     turned
         Triangles left that face away from the surface.
     crossing
@@ -69,6 +70,7 @@ def refine(
     voronoi: RestrictedVoronoi,
     sites: Sites,
     surface: Surface,
+    plain: Surface,
     boundary: Boundary,
     scale: float,
     *,
@@ -86,8 +88,10 @@ def refine(
         Optimised positions (S, d).
     surface
         The surface in space, its faces in the order of ``voronoi``.
+    plain
+        Another mesh of the same surface, to be coarsened if all else fails.
     boundary
-        Its boundary.
+        The boundary of the surface.
     scale
         The factor of the first three embedded coordinates.
     n_vertices
@@ -112,11 +116,12 @@ def refine(
     6. Triangles that intersect where the surface does not are taken apart; points that this takes are made up for by
        collapses elsewhere.
 
-    Where step 1 does not succeed (a tube thinner than the distance between sites) the working surface itself, which
-    is valid, is coarsened by the same collapses. The paper inserts sites for every defect and optimises again;
+    Where step 1 does not succeed (a tube thinner than the distance between sites) the surface itself, which is valid,
+    is coarsened by the same collapses. The paper inserts sites for every defect and optimises again;
     that makes new defects as it mends old ones.
     """
     n_start = len(sites)
+    most = MAX_GROWTH * n_vertices + MAX_MORE
     for _ in range(MAX_ROUNDS):
         diagram = voronoi.diagram(sites)
         cells = cells_of(diagram, surface.face_neighbours, voronoi.facets.area)
@@ -129,12 +134,12 @@ def refine(
                 points_on_boundary(arcs, boundary.curves, cells, sites),
             ]
         )
-        if len(missing) == 0 or len(sites) + len(missing) > MAX_SITES * surface.n_points:
+        if len(missing) == 0 or bad.mean() > MAX_SHARE or len(sites) + len(missing) > most:
             break
         sites = np.concatenate([sites, missing])
     from_input = len(missing) > 0
     if from_input:
-        points, faces = voronoi.points, surface.faces
+        space, faces = plain.points, plain.faces
     else:
         points, faces, _ = simplicial_mesh(dual_mesh(diagram, cells, surface))
         points, on_boundary = put_on_boundary(points, arcs, cells)
@@ -143,10 +148,11 @@ def refine(
         creased = creased[~on_boundary[creased]]
         points[creased, :3] = scale * crease_positions(voronoi, diagram, cells, scale, creased)
         inside = ~on_boundary[: len(cells.site)]
-        points[:, :3] = scale * snap_to_missed(diagram, cells, surface, points[:, :3] / scale, faces, sharp, inside)
-    inserted = max(len(points) - n_start, 0) if not from_input else 0
+        space = snap_to_missed(diagram, cells, surface, points[:, :3] / scale, faces, sharp, inside)
+    n_first = len(space)
+    inserted = max(n_first - n_start, 0) if not from_input else 0
     reference = ClosestPoints(surface)
-    space, faces, turned = untangle(points[:, :3] / scale, faces, reference)
+    space, faces, turned = untangle(space, faces, reference)
     if len(space) > n_vertices:
         space, faces = decimate(space, faces, n_vertices, reference)
         space, faces, turned = untangle(space, faces, reference)
@@ -159,7 +165,7 @@ def refine(
         diagram=diagram,
         cells=cells,
         inserted=inserted,
-        removed=len(points) - len(space),
+        removed=max(n_first - len(space), 0),
         from_input=from_input,
         turned=turned,
         crossing=crossing,

@@ -19,6 +19,8 @@ from anisomesh.surface.mesh import Surface
 
 MAX_ROUNDS = 30
 _MAX_SPLITS = 6  # rounds of splits that leave as many pairs
+_ZONE = 100  # faces around a pair, about; a try takes time in proportion to them
+_MAX_ZONE = 2_000  # faces around a pair; with more the mesh is crumpled there, and every try takes long
 _MIN_THICKNESS = 1e-3  # area over squared longest side of a triangle that a change may leave
 _LIFTS = (-0.15, -0.05, 0.05, 0.15)  # trial moves of a point along its normal, in lengths of the edges there
 
@@ -56,7 +58,7 @@ def separate(
     reference
         The surface that it stands for.
     max_tries
-        Pairs that are looked at, in all rounds together.
+        Pairs that are looked at, in all rounds together; one amid many faces counts for several.
 
     Returns
     -------
@@ -96,17 +98,24 @@ def _changes(
     """Return changes that mend pairs, no two of them near each other."""
     busy = np.zeros(surface.n_faces, dtype=bool)
     changes = []
+    corners = surface.points[surface.faces]
+    boxes = corners.min(axis=1), corners.max(axis=1)
     for pair in pairs:
-        zone = _zone(surface, pair)
+        if tries.left <= 0:
+            break
+        zone = _zone(surface, pair, boxes)
         if busy[zone].any():
+            continue
+        if len(zone) > _MAX_ZONE:
+            tries.left -= 1
             continue
         used, faces = np.unique(surface.faces[zone], return_inverse=True)
         local = Surface(surface.points[used], faces.reshape(-1, 3))
         here = np.searchsorted(zone, pair)
         key = b"".join((local.points.tobytes(), local.faces.tobytes(), here.tobytes(), bytes([allow_equal])))
-        if tries.left == 0 or key in tries.failed:
+        if key in tries.failed:
             continue
-        tries.left -= 1
+        tries.left -= 1 + len(zone) // _ZONE
         change = _best_change(local, here, reference, allow_equal)
         if change is None:
             tries.failed.add(key)
@@ -118,13 +127,12 @@ def _changes(
     return changes
 
 
-def _zone(surface: Surface, pair: Ints) -> Ints:
+def _zone(surface: Surface, pair: Ints, boxes: tuple[Floats, Floats]) -> Ints:
     """Return the faces (n,) around a pair: as far as its longest edge, and all at the corners of its neighbours."""
     corners = surface.points[surface.faces[pair]]
     room = np.linalg.norm(corners - corners[:, [1, 2, 0]], axis=2).max()
     low, high = corners.min(axis=(0, 1)) - room, corners.max(axis=(0, 1)) + room
-    all_corners = surface.points[surface.faces]
-    inside = ((all_corners.max(axis=1) >= low) & (all_corners.min(axis=1) <= high)).all(axis=1)
+    inside = ((boxes[1] >= low) & (boxes[0] <= high)).all(axis=1)
     around = surface.face_neighbours[pair].ravel()
     beside = np.zeros(surface.n_points, dtype=bool)
     beside[surface.faces[np.concatenate([pair, around[around >= 0]])]] = True

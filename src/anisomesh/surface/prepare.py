@@ -15,6 +15,7 @@ from anisomesh.surface.weld import coincident
 
 logger = logging.getLogger(__name__)
 
+LARGEST = 1e60  # of a coordinate
 MAX_STEPS = 20
 
 WELD_LIMIT = 0.1
@@ -116,7 +117,7 @@ def prepare(surface: Surface, *, weld_tolerance: float = 0.0) -> Prepared:
     Raises
     ------
     MeshError
-        If no face with an area is left.
+        If no face with an area is left, or the coordinates are too large or too small to compute with.
     OptionError
         If the tolerance is negative, not finite, or above a tenth of the diagonal of the bounding box.
 
@@ -129,6 +130,7 @@ def prepare(surface: Surface, *, weld_tolerance: float = 0.0) -> Prepared:
     three times in practice), so that preparing twice does nothing more. Sorting
     dominates the cost: O((V + F) log(V + F)).
     """
+    _check_range(surface)
     _check_tolerance(surface, weld_tolerance)
     steps = [_step(surface, weld_tolerance)]
     while steps[-1].changed and len(steps) < MAX_STEPS:
@@ -197,6 +199,15 @@ def _step(surface: Surface, tolerance: float) -> _Step:
         n_crowded=len(np.unique(topology.edges_of(welded)[1].ravel()[crowded])),
         n_conflicts=int(orientation.conflict.sum()),
     )
+
+
+def _check_range(surface: Surface) -> None:
+    size, extent = float(np.abs(surface.points).max()), float(np.ptp(surface.points, axis=0).max())
+    if size > LARGEST or 0.0 < extent < 1.0 / LARGEST:
+        raise MeshError(
+            f"the mesh is {extent:.3g} wide with coordinates up to {size:.3g}; scale it to between {1.0 / LARGEST:.0e} "
+            f"and {LARGEST:.0e}, beyond which areas overflow or vanish"
+        )
 
 
 def _check_tolerance(surface: Surface, tolerance: float) -> None:

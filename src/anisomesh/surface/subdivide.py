@@ -93,7 +93,7 @@ def split_long_edges(surface: Surface, max_length: float, *, max_faces: int) -> 
         parent = parent[origin]
     complete = not bool((current.edge_lengths > max_length).any())
     if not complete:
-        logger.warning("stopped at %d faces (limit %d) with edges over %g left", current.n_faces, max_faces, max_length)
+        logger.info("stopped at %d faces (limit %d) with edges over %g left", current.n_faces, max_faces, max_length)
     point_corners = np.repeat(np.arange(current.n_points, dtype=np.int32)[:, None], 3, axis=1)
     barycentric = np.tile([1.0, 0.0, 0.0], (current.n_points, 1))
     added = current.faces >= surface.n_points
