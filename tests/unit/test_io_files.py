@@ -13,6 +13,7 @@ import pytest
 from anisomesh.errors import MeshFileError
 from anisomesh.surface import shapes
 from anisomesh.surface.files import atomic_path
+from anisomesh.surface.gmsh_counts import check_counts
 from anisomesh.surface.io import FORMATS, load, save
 from anisomesh.surface.mesh import Surface
 
@@ -295,3 +296,24 @@ def test_common_formats_need_no_heavy_library(tmp_path):
     )
     done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
     assert done.stdout.strip() == "[]"
+
+
+@pytest.mark.parametrize("version", ["gmsh", "gmsh22"])
+@pytest.mark.parametrize("binary", [True, False])
+def test_counts_of_gmsh_files_are_checked_before_the_library_makes_room(tmp_path, version, binary):
+    """Regression: a number of nodes or elements with a digit more took gigabytes before it was refused."""
+    path = tmp_path / "a.msh"
+    meshio.Mesh(BOX.points, [("triangle", BOX.faces)]).write(path, file_format=version, binary=binary)
+    assert load(path).n_faces == BOX.n_faces
+    check_counts(path.read_bytes())
+    data = path.read_bytes()
+    if version == "gmsh22" or not binary:
+        place = data.index(b"\n", data.index(b"$Nodes")) + 1
+        n = str(BOX.n_points).encode()
+        place = data.index(n, place)
+        changed = data[:place] + n + b"99999999" + data[place + len(n) :]
+    else:
+        place = data.index(b"$Nodes\n") + 15
+        changed = data[:place] + (10**9).to_bytes(8, "little") + data[place + 8 :]
+    with pytest.raises(ValueError, match=r"promises \d+ nodes"):
+        check_counts(changed)

@@ -14,6 +14,7 @@ import numpy as np
 import numpy.typing as npt
 
 from anisomesh._arrays import Faces, Points
+from anisomesh.surface.gmsh_counts import check_counts
 from anisomesh.surface.polygons import PolygonSoup, of_equal_size
 
 logger = logging.getLogger(__name__)
@@ -30,11 +31,7 @@ def read_msh(path: Path) -> PolygonSoup:
     """Read the triangles and quadrilaterals of a Gmsh file, version 2.2, 4.0 or 4.1."""
     import meshio
 
-    data = path.read_bytes()
-    for section in (b"$EndNodes", b"$EndElements"):  # meshio does not miss the last one
-        if section not in data:
-            raise ValueError(f"truncated: it has no {section.decode()}")
-
+    check_counts(path.read_bytes())
     return _surface_cells(_quietly(lambda: meshio.gmsh.read(path)))
 
 

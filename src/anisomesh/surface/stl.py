@@ -28,7 +28,9 @@ def read_stl(data: bytes) -> PolygonSoup:
     """
     promised = int.from_bytes(data[80:84], "little") if len(data) >= HEADER_BYTES else -1
     if len(data) == HEADER_BYTES + promised * TRIANGLE.itemsize:
-        corners = np.frombuffer(data, dtype=TRIANGLE, offset=HEADER_BYTES)["corners"].astype(np.float64).reshape(-1, 3)
+        with np.errstate(invalid="ignore"):  # NaN is refused later, with its place
+            corners = np.frombuffer(data, dtype=TRIANGLE, offset=HEADER_BYTES)["corners"].astype(np.float64)
+        corners = corners.reshape(-1, 3)
     elif data.lstrip()[:5].lower() == b"solid" and b"facet" in data[:4096].lower():
         corners = _text_corners(data.lower())
     elif promised < 0:

@@ -94,7 +94,8 @@ def read_medit(data: bytes) -> PolygonSoup:
         if name == b"Vertices":
             points = np.pad(rows, ((0, 0), (0, 3 - width)))
         else:
-            corners.append(rows.astype(np.int64).ravel() - 1)
+            with np.errstate(invalid="ignore"):  # what is no index is refused later as out of range
+                corners.append(rows.astype(np.int64).ravel() - 1)
             sizes.append(np.full(len(rows), width, dtype=np.int64))
     others = sorted({tokens[k].decode(errors="replace") for k in words} & {"Tetrahedra", "Hexahedra", "Prisms"})
     if len(sizes) == 1 and others:

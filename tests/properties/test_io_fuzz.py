@@ -1,0 +1,101 @@
+"""The readers on twenty thousand damaged files: one clear error or a mesh, no crash, no hang, no large allocation."""
+
+import re
+import struct
+import time
+import tracemalloc
+
+import numpy as np
+import pytest
+
+from anisomesh.errors import MeshFileError
+from anisomesh.surface.io import FORMATS, load, save
+from anisomesh.surface.mesh import Surface
+
+CASES = 2_300  # of each kind of file
+MOST_BYTES = 8 * 2**20  # more than any of these files has a right to
+MOST_SECONDS = 2.0
+
+ASCII_PLY = """ply
+format ascii 1.0
+element vertex 4
+property float x
+property float y
+property float z
+element face 2
+property list uchar int vertex_indices
+end_header
+0 0 0
+1 0 0
+0 1 0
+0 0 1
+3 0 1 2
+3 1 2 3
+"""
+ASCII_STL = "solid a\n" + 2 * (
+    "facet normal 0 0 1\nouter loop\nvertex 0 0 0\nvertex 1 0 0\nvertex 0 1 0.5\nendloop\nendfacet\n"
+)
+KINDS = {**dict.fromkeys(FORMATS), "ascii.ply": ASCII_PLY, "ascii.stl": ASCII_STL + "endsolid a\n"}
+HOSTILE = [b"999999999", b"-1", b"4294967295", b"1e308", b"nan", b"99999999999999999999", b"", b"0"]
+
+
+def original(kind, tmp_path):
+    if KINDS[kind] is not None:
+        return KINDS[kind].encode()
+    path = tmp_path / f"original{kind}"
+    save(Surface(np.random.default_rng(0).normal(size=(8, 3)), np.array([[0, 1, 2], [3, 4, 5], [5, 6, 7]])), path)
+    return path.read_bytes()
+
+
+def damaged(data, rng):
+    """Return the file cut off, with bytes changed, doubled or left out, or with another number in place of one."""
+    way = rng.integers(6)
+    place = int(rng.integers(len(data)))
+    if way == 0:
+        return data[:place]
+    if way == 1:
+        changed = bytearray(data)
+        for _ in range(rng.integers(1, 5)):
+            changed[rng.integers(len(data))] = rng.integers(256)
+        return bytes(changed)
+    if way == 2:
+        numbers = list(re.finditer(rb"\d+", data))
+        if numbers:
+            chosen = numbers[rng.integers(len(numbers))]
+            return data[: chosen.start()] + HOSTILE[rng.integers(len(HOSTILE))] + data[chosen.end() :]
+    if way == 3:
+        value = struct.pack("<I", rng.choice([0xFFFFFFFF, 0x7FFFFFFF, 0x00FFFFFF, 0]))
+        return data[:place] + value + data[place + 4 :]
+    end = int(min(place + rng.integers(1, 60), len(data)))
+    return data[:place] + (data[place:end] + data[place:] if way == 4 else data[end:])
+
+
+@pytest.mark.parametrize("kind", KINDS)
+def test_damaged_files(kind, tmp_path, capfd):
+    rng = np.random.default_rng(1)
+    data = original(kind, tmp_path)
+    path = tmp_path / (kind if KINDS[kind] else f"mesh{kind}")
+    path.write_bytes(data)
+    load(path)  # what it imports and caches is not counted below
+    errors = 0
+    tracemalloc.start()
+    try:
+        for case in range(CASES):
+            path.write_bytes(damaged(data, rng))
+            tracemalloc.reset_peak()
+            before, start = tracemalloc.get_traced_memory()[0], time.perf_counter()
+            try:
+                surface = load(path)
+            except MeshFileError as error:
+                errors += 1
+                assert str(error).startswith(f"{path}: "), case
+                assert len(str(error).splitlines()) == 1, case
+            else:
+                assert surface.n_faces >= 1, case
+                assert np.isfinite(surface.points).all(), case
+            assert tracemalloc.get_traced_memory()[1] - before < MOST_BYTES, case
+            assert time.perf_counter() - start < MOST_SECONDS, case
+    finally:
+        tracemalloc.stop()
+    assert errors > CASES // 20
+    assert capfd.readouterr() == ("", "")
