@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from anisomesh._arrays import Faces, Points, PointTensors, Sites
+from anisomesh._arrays import Faces, PointMask, Points, PointTensors, Sites
 from anisomesh.cvt.arcs import Boundary
 from anisomesh.cvt.diagram import Diagram
 from anisomesh.cvt.voronoi import RestrictedVoronoi
@@ -15,7 +15,7 @@ from anisomesh.dual.cells import Cells, cells_of
 from anisomesh.dual.decimate import decimate
 from anisomesh.dual.flip import flip_for_shape
 from anisomesh.dual.insert import points_in_cells, points_in_components
-from anisomesh.dual.place import crease_positions, creased_cells, snap_to_missed
+from anisomesh.dual.place import crease_positions, creased_cells, put_on_creases, put_on_planes, snap_to_missed
 from anisomesh.dual.separate import separate
 from anisomesh.dual.simplicial import simplicial_mesh
 from anisomesh.dual.triangulate import dual_mesh
@@ -143,12 +143,9 @@ def refine(
     else:
         points, faces, _ = simplicial_mesh(dual_mesh(diagram, cells, surface))
         points, on_boundary = put_on_boundary(points, arcs, cells)
-        sharp = sharp_edges(surface, crease_angle)
-        creased = creased_cells(diagram, cells, surface, sharp)
-        creased = creased[~on_boundary[creased]]
-        points[creased, :3] = scale * crease_positions(voronoi, diagram, cells, scale, creased)
-        inside = ~on_boundary[: len(cells.site)]
-        space = snap_to_missed(diagram, cells, surface, points[:, :3] / scale, faces, sharp, inside)
+        space = _placed(
+            voronoi, diagram, cells, surface, points[:, :3] / scale, faces, on_boundary, scale, crease_angle
+        )
     n_first = len(space)
     inserted = max(n_first - n_start, 0) if not from_input else 0
     reference = ClosestPoints(surface)
@@ -170,6 +167,27 @@ def refine(
         turned=turned,
         crossing=crossing,
     )
+
+
+def _placed(
+    voronoi: RestrictedVoronoi,
+    diagram: Diagram,
+    cells: Cells,
+    surface: Surface,
+    points: Points,
+    faces: Faces,
+    on_boundary: PointMask,
+    scale: float,
+    crease_angle: float,
+) -> Points:
+    """Return the points of the dual in space (V, 3), those within the boundary on planes, creases and corners."""
+    sharp = sharp_edges(surface, crease_angle)
+    placed = put_on_planes(diagram, cells, surface, points)
+    creased = creased_cells(diagram, cells, surface, sharp)
+    placed[creased] = crease_positions(voronoi, diagram, cells, scale, creased)
+    placed = put_on_creases(diagram, cells, surface, placed, faces, sharp)
+    placed[on_boundary] = points[on_boundary]
+    return snap_to_missed(diagram, cells, surface, placed, faces, sharp, ~on_boundary[: len(cells.site)])
 
 
 def _without_crossings(
