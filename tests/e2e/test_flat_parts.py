@@ -29,7 +29,7 @@ PARTS = {
 }
 
 
-@pytest.mark.parametrize("seed", [0, 1])
+@pytest.mark.parametrize("seed", range(3))
 @pytest.mark.parametrize("name", PARTS)
 def test_corners_and_planes_are_exact_and_creases_covered(name, seed):
     make, n = PARTS[name]
@@ -47,8 +47,8 @@ def test_corners_and_planes_are_exact_and_creases_covered(name, seed):
     tree = igl.AABB()
     tree.init(new.points, bent)
     from_crease = np.sqrt(tree.squared_distance(new.points, bent, along)[0])
-    # a cell that reaches into two creases, and not to the corner between them, leaves one of them cut off
-    assert (from_crease < 1e-6 * size).mean() > 0.95
+    # a cell that reaches into two creases, but not to the corner between them, can leave one of them cut off
+    assert (from_crease < 1e-6 * size).mean() > 0.97
     assert new.n_points == n
     assert result.validity.euler == 2
     assert result.validity.flipped == 0

@@ -52,7 +52,16 @@ def halved_sphere():
     return without_faces(ball, (ball.points[ball.faces][:, :, 2] < -0.1).any(axis=1))
 
 
+def wedge():
+    """Return a triangle with a tip of 11 degrees, in many small triangles."""
+    patch = square(24)
+    x, y = patch.points[:, 0], patch.points[:, 1]
+    points = np.stack([x + 0.01, 0.2 * (x + 0.01) * (y - 0.5), 0.0 * x], axis=1)
+    return Surface(points, patch.faces)
+
+
 OPEN = {
+    "wedge": (wedge, 60),
     "square": (square, 150),
     "few": (square, 12),
     "pierced": (pierced, 80),

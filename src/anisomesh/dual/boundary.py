@@ -3,12 +3,14 @@
 from __future__ import annotations
 
 import numpy as np
+import numpy.typing as npt
 
 from anisomesh._arrays import EmbeddedPoints, PointMask, Points, Sites
 from anisomesh.cvt.arcs import Arcs
 from anisomesh.dual.cells import Cells
 from anisomesh.surface.boundary import BoundaryCurves
 
+_SAMPLES = 32  # of an arc, for the point closest to its site
 MIN_ARCS = 3  # of a boundary curve, so that the dual has a loop there
 
 
@@ -16,8 +18,9 @@ def points_on_boundary(arcs: Arcs, curves: BoundaryCurves, cells: Cells, sites: 
     """Return points of the boundary (n, d) that are missing as sites.
 
     A component of a cell with several arcs would pinch the dual, and a boundary curve of fewer than three arcs has no
-    loop in it. New sites go to the arcs of such a cell but the one nearest to its site, on such a curve to the quarter
-    points of its longest arc, and to corners that share their arc with others.
+    loop in it. New sites go to the arcs of such a cell but the one nearest to its site, at the point closest to the
+    site: so near the tip of a wedge sites on its sides come to be opposite each other. They also go to the quarter
+    points of the longest arc of such a curve, and to corners that share their arc with others.
     """
     component = cells.of_polygon[arcs.polygon]
     distance = np.linalg.norm(sites[arcs.site] - arcs.place, axis=1)
@@ -27,7 +30,18 @@ def points_on_boundary(arcs: Arcs, curves: BoundaryCurves, cells: Cells, sites: 
     order = np.lexsort((arcs.length, arcs.curve))
     longest = order[np.searchsorted(arcs.curve[order], few, side="right") - 1]
     quarters = [curves.at(arcs.start[longest] + share * arcs.length[longest], few) for share in (0.25, 0.75)]
-    return np.concatenate([arcs.place[torn], *quarters, arcs.second])
+    return np.concatenate([_nearest(arcs, curves, torn, sites), *quarters, arcs.second])
+
+
+def _nearest(arcs: Arcs, curves: BoundaryCurves, which: npt.NDArray[np.int64], sites: Sites) -> EmbeddedPoints:
+    """Return the point of each of these arcs (n,) that is closest to its site (n, d), within a share of the arc."""
+    shares = (np.arange(_SAMPLES) + 0.5) / _SAMPLES
+    places = arcs.start[which, None] + shares * arcs.length[which, None]
+    points = curves.at(places.ravel(), np.repeat(arcs.curve[which], _SAMPLES)).reshape(
+        len(which), _SAMPLES, sites.shape[1]
+    )
+    distance = np.linalg.norm(points - sites[arcs.site[which], None], axis=2)
+    return np.asarray(points[np.arange(len(which)), np.argmin(distance, axis=1)])
 
 
 def put_on_boundary(points: Points, arcs: Arcs, cells: Cells) -> tuple[Points, PointMask]:

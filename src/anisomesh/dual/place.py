@@ -16,9 +16,9 @@ from anisomesh.surface.mesh import Surface
 
 _SHARPNESS = 100.0
 _SNAP = 0.05  # mean edge lengths by which a point may move to be exactly on a corner or crease
-_FAR_SNAP = 0.4  # the same where the crease goes through the cell for a longer way,
+_FAR_SNAP = 0.45  # the same where the crease goes through the cell for a longer way,
 _TINY_SNAP = 1e-3  # the same where the creases in the cell are not straight
-_LONG = 0.25  # of so many mean edge lengths
+_LONG = 0.05  # of so many mean edge lengths
 _SAME_PLANE = 1e-9  # by which the normals of facets in one plane may differ, and directions of one line
 _MISSED = 0.05  # mean edge lengths between a corner and the mesh, from which on it counts as missed
 
@@ -86,7 +86,7 @@ def put_on_creases(
     Notes
     -----
     A point no farther than a twentieth of an edge from a corner in its cell goes there, another to the closest point of
-    the creases in its cell, if these are straight and that is as near. Where a quarter of an edge length of crease or
+    the creases in its cell, if these are straight and that is as near. Where a twentieth of an edge length of crease or
     more between two planes is in the cell it may be farther: the neighbours on both sides along the crease are then too
     far apart to be joined by an edge. On a curved crease points stay a little outside, where they are best for its
     chords.
