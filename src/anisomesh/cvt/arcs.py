@@ -176,5 +176,5 @@ class Boundary:
 
 
 def _changes(labels: Ints) -> Mask:
-    """Return where a label (n,) is not that of the one before; the first is not."""
+    """Return where a label (n,) is not that of the one before; the first counts as such."""
     return np.append(True, labels[1:] != labels[:-1])[: len(labels)]

@@ -78,6 +78,7 @@ def check_validity(result: Surface, reference: Surface) -> Validity:
     reference
         The input it stands for, consistently oriented, in the same units.
     """
+    pairs_input = self_intersections(reference)
     return Validity(
         closed=bool((result.edge_face_count == 2).all()),
         boundary_loops=len(boundary_loops(result.faces)),
@@ -92,15 +93,19 @@ def check_validity(result: Surface, reference: Surface) -> Validity:
         oriented=is_oriented(result.faces),
         flipped=int(flipped_faces(result, reference).sum()),
         self_intersections=len(self_intersections(result)),
-        self_intersections_input=len(self_intersections(reference)),
-        new_intersections=len(new_intersections(result, crossing_facets(reference))),
+        self_intersections_input=len(pairs_input),
+        new_intersections=len(new_intersections(result, _facets_of(reference, pairs_input))),
     )
 
 
 def crossing_facets(reference: Surface) -> ClosestPoints | None:
     """Return the facets of a surface that intersect others, for :func:`new_intersections`, None if there are none."""
-    facets = np.unique(self_intersections(reference))
-    return ClosestPoints(Surface(reference.points, reference.faces[facets])) if len(facets) else None
+    return _facets_of(reference, self_intersections(reference))
+
+
+def _facets_of(surface: Surface, pairs: Pairs) -> ClosestPoints | None:
+    facets = np.unique(pairs)
+    return ClosestPoints(Surface(surface.points, surface.faces[facets])) if len(facets) else None
 
 
 def new_intersections(result: Surface, crossing: ClosestPoints | None) -> Pairs:

@@ -15,7 +15,7 @@ from anisomesh.surface.weld import coincident
 
 logger = logging.getLogger(__name__)
 
-LARGEST = 1e60  # of a coordinate
+LARGEST = 1e152  # of a coordinate, whose square is a number
 MAX_STEPS = 20
 
 WELD_LIMIT = 0.1
