@@ -1,13 +1,15 @@
-"""Ctrl-C in the middle of the computation: exit code 130, no file left."""
+"""Ctrl-C in the middle of the computation: exit code 130, no file left. Killed: the old file or the whole new one."""
 
 import os
 import signal
 import subprocess
 import sys
 import threading
+import time
 
 import pytest
 
+from anisomesh.surface.io import load
 from conftest import CLI
 
 
@@ -38,3 +40,24 @@ def test_interrupt_leaves_no_file(large_torus_obj, tmp_path):
     assert "Traceback" not in rest
     assert out == ""
     assert list(tmp_path.iterdir()) == []
+
+
+def test_killed_at_any_moment_the_old_file_or_the_whole_new_one_is_there(torus_obj, tmp_path):
+    """Runs are killed ever later, until one is through; where it writes, the moments are close together."""
+    out = tmp_path / "out.ply"
+    words = [*CLI, "remesh", str(torus_obj), "-o", str(out), "-n", "150", "--quiet"]
+    start = time.perf_counter()
+    subprocess.run(words, check=True, timeout=240)
+    whole, n_new = time.perf_counter() - start, load(out).n_points
+    old = torus_obj.read_bytes()
+    done = 0
+    for share in (0.2, 0.5, 0.8, 0.9, 0.94, 0.97, 1.0, 1.03):
+        out.write_bytes(old)
+        process = subprocess.Popen(words)
+        time.sleep(share * whole)
+        process.kill()
+        process.wait()
+        if out.read_bytes() != old:
+            assert load(out).n_points == n_new
+            done += 1
+    assert done < 8

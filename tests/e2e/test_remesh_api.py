@@ -75,6 +75,12 @@ def test_same_seed_same_bytes_whatever_the_threads(ring):
     assert other.points.tobytes() != runs[0].points.tobytes()
 
 
+def test_an_open_surface_gives_the_same_bytes_whatever_the_threads():
+    patch = open_patch(lambda x, y: 0.3 * np.sin(4 * x) * y, n=24)
+    runs = [anisomesh.remesh(patch, n_vertices=120, threads=threads, **FEW).surface for threads in (1, 2, 2)]
+    assert len({run.points.tobytes() + run.faces.tobytes() for run in runs}) == 1
+
+
 def test_position_and_scale_of_the_model_come_back(ring):
     moved = ring.with_points(1000.0 * ring.points + [5e4, 0.0, -2e4])
     there = anisomesh.remesh(moved, n_vertices=150, **FEW).surface
