@@ -12,7 +12,7 @@ import pytest
 from anisomesh.batch import methods
 from anisomesh.batch.runs import read_rows, run_suite
 from anisomesh.batch.suite import parse_suite
-from anisomesh.batch.tables import markdown, web_page
+from anisomesh.batch.tables import markdown, run_table, web_page
 from anisomesh.errors import AnisomeshError
 from anisomesh.surface.io import save
 from anisomesh.surface.mesh import Surface
@@ -139,6 +139,17 @@ def test_open_and_broken_meshes_are_rows(tmp_path):
         ("c.ply", "failed"),
     ]
     assert "c.ply" in rows[2]["error"]
+
+
+def test_the_boundary_of_open_meshes_is_in_the_tables(tmp_path):
+    save(open_patch(lambda x, y: x * y, n=12), tmp_path / "open.ply")
+    both = suite(meshes=["*.ply"], ratios=[0.5])
+    rows = run_suite(both, tmp_path / "rows", data=tmp_path)
+    heading, lines = run_table(rows)
+    shown = {line[0]: line[heading.index("boundary, max")] for line in lines}
+    closed = next(name for name in shown if name != "open.ply")
+    assert 0.0 <= float(shown["open.ply"]) < 0.5
+    assert shown[closed] == "-"
 
 
 def test_a_foreign_file_of_rows_is_not_touched(tmp_path):

@@ -71,7 +71,7 @@ def test_the_coarse_samplings_need_mending(shape):
 def test_enough_sites_are_the_vertices_of_the_mesh(shape):
     voronoi, sites, surface = case(shape, 200)
     result = mended(voronoi, sites, surface)
-    assert (result.inserted, result.removed, result.turned, result.from_input) == (0, 0, 0, False)
+    assert (result.inserted, result.removed, result.from_input) == (0, 0, False)
     np.testing.assert_array_equal(result.points, sites)
 
 

@@ -33,6 +33,18 @@ def _figure(*path: str, factor: float = 1.0) -> Callable[[Row], float | None]:
     return value
 
 
+def _boundary(which: str) -> Callable[[Row], float | None]:
+    """Return the larger of the two distances between boundaries, in mean edge lengths of the result."""
+
+    def value(row: Row) -> float | None:
+        found = row["evaluation"].get("boundary")
+        if found is None:
+            return None
+        return float(max(found[f"{which}_ab"], found[f"{which}_ba"]) / row["evaluation"]["shape"]["edge_mean"])
+
+    return value
+
+
 COLUMNS = (
     Column("V", _figure("vertices"), 0),
     Column("CD x1e-5", _figure("sampled", "chamfer", factor=1e5), 3),
@@ -48,6 +60,8 @@ COLUMNS = (
     Column("G", _figure("shape", "g_mean"), 3),
     Column("G 5 %", _figure("shape", "g_low"), 3),
     Column("creases", _figure("features", "crease_covered"), 3),
+    Column("boundary, mean", _boundary("mean"), 3),
+    Column("boundary, max", _boundary("max"), 3),
     Column("seconds", lambda row: float(row["seconds"]), 2),
 )
 

@@ -27,10 +27,16 @@ def creased_cells(
     diagram: Diagram, cells: Cells, surface: Surface, sharp: npt.NDArray[np.bool_]
 ) -> npt.NDArray[np.int64]:
     """Return the cells (n,) that hold a piece of a sharp edge; ``surface`` has its faces in the diagram's order."""
-    on_side = np.flatnonzero(diagram.label < 0)
-    polygon = diagram.polygon_of[on_side]
-    edge = surface.face_edges[diagram.facet[polygon], -1 - diagram.label[on_side]]
-    return np.unique(cells.of_polygon[polygon[sharp[edge]]]).astype(np.int64)
+    return np.unique(cells.of_polygon[diagram.polygon_of[_on_creases(diagram, surface, sharp)[0]]]).astype(np.int64)
+
+
+def _on_creases(
+    diagram: Diagram, surface: Surface, sharp: npt.NDArray[np.bool_]
+) -> tuple[npt.NDArray[np.int64], npt.NDArray[np.int32]]:
+    """Return the edges of polygons (n,) that are on a sharp edge of the surface, and which that is (n,)."""
+    side = np.flatnonzero(diagram.label < 0)
+    edge = surface.face_edges[diagram.facet[diagram.polygon_of[side]], -1 - diagram.label[side]]
+    return side[sharp[edge]], edge[sharp[edge]]
 
 
 def crease_positions(
@@ -92,10 +98,7 @@ def put_on_creases(
     chords.
     """
     edge = float(Surface(points, faces).edge_lengths.mean())
-    side = np.flatnonzero(diagram.label < 0)
-    facet = diagram.facet[diagram.polygon_of[side]]
-    crease = surface.face_edges[facet, -1 - diagram.label[side]]
-    side, crease = side[sharp[crease]], crease[sharp[crease]]
+    side, crease = _on_creases(diagram, surface, sharp)
     cell = cells.of_polygon[diagram.polygon_of[side]].astype(np.int64)
     ends = [_in_space(diagram, surface, vertex) for vertex in (side, diagram.following[side])]
     along = ends[1] - ends[0]

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from anisomesh._arrays import Faces, PointMask, Points, PointTensors, Sites
-from anisomesh.cvt.arcs import Boundary
+from anisomesh.cvt.arcs import Arcs, Boundary
 from anisomesh.cvt.diagram import Diagram
 from anisomesh.cvt.voronoi import RestrictedVoronoi
 from anisomesh.dual.boundary import points_on_boundary, put_on_boundary
@@ -49,10 +49,6 @@ class Refined:
         Points taken away again by edge collapses.
     from_input
         Whether the surface itself was coarsened, because its embedding asks for many more sites.
-    turned
-        Triangles left that face away from the surface.
-    crossing
-        Pairs of triangles left that intersect where the surface does not.
     """
 
     points: Points
@@ -62,8 +58,6 @@ class Refined:
     inserted: int
     removed: int
     from_input: bool
-    turned: int
-    crossing: int
 
 
 def refine(
@@ -121,6 +115,37 @@ def refine(
     that makes new defects as it mends old ones.
     """
     n_start = len(sites)
+    diagram, cells, arcs, complete = _with_enough_sites(voronoi, sites, surface, boundary, n_vertices)
+    if complete:
+        points, faces, _ = simplicial_mesh(dual_mesh(diagram, cells, surface))
+        points, rim = put_on_boundary(points, arcs, cells)
+        space = _placed(voronoi, diagram, cells, surface, points[:, :3] / scale, faces, rim, scale, crease_angle)
+    else:
+        space, faces = plain.points, plain.faces
+    n_first = len(space)
+    reference = ClosestPoints(surface)
+    space, faces, _ = untangle(space, faces, reference)
+    if len(space) > n_vertices:
+        space, faces = decimate(space, faces, n_vertices, reference)
+        space, faces, _ = untangle(space, faces, reference)
+    roots = transfer_metric_roots(reference, metric_root(tensors), space)
+    faces = flip_for_shape(space, faces, roots, reference)
+    space, faces = _without_crossings(space, faces, n_vertices, reference)
+    return Refined(
+        points=space,
+        faces=faces,
+        diagram=diagram,
+        cells=cells,
+        inserted=max(n_first - n_start, 0) if complete else 0,
+        removed=max(n_first - len(space), 0),
+        from_input=not complete,
+    )
+
+
+def _with_enough_sites(
+    voronoi: RestrictedVoronoi, sites: Sites, surface: Surface, boundary: Boundary, n_vertices: int
+) -> tuple[Diagram, Cells, Arcs, bool]:
+    """Return diagram, cells and arcs with sites added until none is missing, and whether that was reached."""
     most = MAX_GROWTH * n_vertices + MAX_MORE
     for _ in range(MAX_ROUNDS):
         diagram = voronoi.diagram(sites)
@@ -137,36 +162,7 @@ def refine(
         if len(missing) == 0 or bad.mean() > MAX_SHARE or len(sites) + len(missing) > most:
             break
         sites = np.concatenate([sites, missing])
-    from_input = len(missing) > 0
-    if from_input:
-        space, faces = plain.points, plain.faces
-    else:
-        points, faces, _ = simplicial_mesh(dual_mesh(diagram, cells, surface))
-        points, on_boundary = put_on_boundary(points, arcs, cells)
-        space = _placed(
-            voronoi, diagram, cells, surface, points[:, :3] / scale, faces, on_boundary, scale, crease_angle
-        )
-    n_first = len(space)
-    inserted = max(n_first - n_start, 0) if not from_input else 0
-    reference = ClosestPoints(surface)
-    space, faces, turned = untangle(space, faces, reference)
-    if len(space) > n_vertices:
-        space, faces = decimate(space, faces, n_vertices, reference)
-        space, faces, turned = untangle(space, faces, reference)
-    roots = transfer_metric_roots(reference, metric_root(tensors), space)
-    faces = flip_for_shape(space, faces, roots, reference)
-    space, faces, crossing = _without_crossings(space, faces, n_vertices, reference)
-    return Refined(
-        points=space,
-        faces=faces,
-        diagram=diagram,
-        cells=cells,
-        inserted=inserted,
-        removed=max(n_first - len(space), 0),
-        from_input=from_input,
-        turned=turned,
-        crossing=crossing,
-    )
+    return diagram, cells, arcs, len(missing) == 0
 
 
 def _placed(
@@ -190,9 +186,7 @@ def _placed(
     return snap_to_missed(diagram, cells, surface, placed, faces, sharp, ~on_boundary[: len(cells.site)])
 
 
-def _without_crossings(
-    points: Points, faces: Faces, n_vertices: int, reference: ClosestPoints
-) -> tuple[Points, Faces, int]:
+def _without_crossings(points: Points, faces: Faces, n_vertices: int, reference: ClosestPoints) -> tuple[Points, Faces]:
     """Return the mesh with intersecting triangles taken apart, and back at no more points than before if possible."""
     n_wanted = max(n_vertices, len(points))
     points, faces, crossing = separate(points, faces, reference)
@@ -204,4 +198,4 @@ def _without_crossings(
         if coarser[2] > crossing:
             break
         points, faces, crossing = coarser
-    return points, faces, crossing
+    return points, faces

@@ -73,8 +73,10 @@ def separate(
     surface. None of these makes a triangle that is turned against the surface. Where nothing helps, splits are made
     that leave as many pairs, a few times over. The rounds are bounded, and the best mesh met is returned.
     """
+    if len(self_intersections(Surface(points, faces))) == 0:
+        return points, faces, 0  # most often, and without a search for intersections of the reference
     crossing = crossing_facets(reference.surface)
-    best = points, faces, len(new_intersections(Surface(points, faces), crossing))
+    best = points, faces, len(faces) ** 2
     splits = 0
     tries = _Tries(max_tries)
     for _ in range(MAX_ROUNDS):
