@@ -23,3 +23,7 @@ class MetricError(AnisomeshError, ValueError):
 
 class OptionError(AnisomeshError, ValueError):
     """An option has a value outside its range."""
+
+
+class TimeLimitError(AnisomeshError):
+    """The time limit was over before there was anything to return."""

@@ -39,9 +39,14 @@ class RemeshOptions:
         Bound on the local/global steps of the direct embedding.
     weld_tolerance
         Points of the input up to this distance (model units) become one.
-    crease_angle
-        Edges of the input whose faces differ by more than this many degrees are creases, onto which the vertices of
-        their cells are put; 180 for none. The plain CVT (``sharpness`` 1) has none.
+    feature_angle
+        Edges of the input whose faces differ by more than this many degrees are creases, which edges of the result
+        follow where there are vertices enough; 180 for none. The plain CVT (``sharpness`` 1) has none.
+    features
+        Edges of the input that are creases in any case, as pairs of its points (n, 2).
+    time_limit
+        Wall-clock seconds after which the optimisation and the mending of faults end with what they have. The first
+        60 % are for the optimisation. What a valid mesh needs is done all the same, so it may take somewhat longer.
     """
 
     sharpness: float = 7.0
@@ -54,7 +59,9 @@ class RemeshOptions:
     max_iterations: int = 150
     embedding_iterations: int = 10
     weld_tolerance: float = 0.0
-    crease_angle: float = 45.0
+    feature_angle: float = 40.0
+    features: npt.ArrayLike | None = None
+    time_limit: float | None = None
 
     def __post_init__(self) -> None:
         for name in ("sharpness", "final_sharpness"):
@@ -65,8 +72,10 @@ class RemeshOptions:
             raise OptionError(f"metric = {self.metric!r}; expected one of {', '.join(METRIC_NAMES)}, or tensors")
         if self.embedding != "direct":
             raise OptionError(f"embedding = {self.embedding!r}; expected 'direct'")
-        if not 0.0 <= self.crease_angle <= 180.0:
-            raise OptionError(f"crease_angle = {self.crease_angle}; expected 0 to 180 degrees")
+        if not 0.0 <= self.feature_angle <= 180.0:
+            raise OptionError(f"feature_angle = {self.feature_angle}; expected 0 to 180 degrees")
+        if self.time_limit is not None and not self.time_limit > 0.0:
+            raise OptionError(f"time_limit = {self.time_limit}; expected a positive number of seconds")
         for name, low in (
             ("seed", 0),
             ("threads", 1),

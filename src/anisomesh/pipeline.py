@@ -7,37 +7,40 @@ import time
 from collections.abc import Iterator
 from contextlib import contextmanager
 from dataclasses import fields, replace
+from functools import partial
 from typing import Any
 
 import numpy as np
 import numpy.typing as npt
 
-from anisomesh.cvt.arcs import Boundary
-from anisomesh.cvt.optimise import Optimised, lloyd, minimise
-from anisomesh.cvt.sampling import resample_by_energy, sample_surface
+from anisomesh._arrays import EdgeMask
+from anisomesh.clock import Clock
+from anisomesh.cvt.features import Features
+from anisomesh.cvt.optimise import Optimised, Status
 from anisomesh.cvt.voronoi import RestrictedVoronoi
-from anisomesh.dual.exchange import exchange_sites
 from anisomesh.dual.refine import Refined, refine
 from anisomesh.embedding.direct import embed
-from anisomesh.errors import MetricError, OptionError
+from anisomesh.errors import MetricError, OptionError, TimeLimitError
 from anisomesh.evaluation.validity import Validity, check_validity
-from anisomesh.metric.tensor import compute_metric
+from anisomesh.metric.tensor import MetricName, compute_metric
 from anisomesh.options import OnStep, RemeshOptions, StepInfo
 from anisomesh.result import RemeshResult
+from anisomesh.schedule import optimise
+from anisomesh.search import MIN_VERTICES, smallest_within
 from anisomesh.surface.convert import as_surface
+from anisomesh.surface.features import sharp_edges
 from anisomesh.surface.geometry import unit_frame
 from anisomesh.surface.mesh import Surface
 from anisomesh.surface.prepare import Prepared, prepare
 from anisomesh.surface.subdivide import split_long_edges
+from anisomesh.surface.tagged import edges_within, tagged_edges
 
-MIN_VERTICES = 4
 COUNT_TOLERANCE = 0.02  # share of the asked vertices by which the result may differ without a warning
 FINE_POINTS = 5_000  # the working surface has edges no longer than an even mesh of so many points
 EDGE_FACTOR = 1.6  # and no longer than this many distances between sites
-EXCHANGE_AT = 0.6  # share of the iterations after which sites are exchanged
-DENSITY_SHARPNESS = 1.5  # sharpness of the energy that sites are distributed by, over that of the optimisation
 MAX_GROWTH = 8  # splitting makes at most so many times the faces, or MAX_SPLIT_FACES
 MAX_SPLIT_FACES = 60_000
+OPTIMISATION_SHARE = 0.6  # of the time limit is for all up to the end of the optimisation
 BYTES_PER_VERTEX, BYTES_PER_FACE = 6_000, 1_500  # of memory; measured with benchmarks/speed.py
 
 
@@ -47,6 +50,7 @@ def remesh(
     *,
     n_vertices: int | None = None,
     ratio: float | None = None,
+    max_error: float | None = None,
     options: RemeshOptions | None = None,
     on_step: OnStep | None = None,
     **overrides: Any,
@@ -64,6 +68,9 @@ def remesh(
         Vertices of the result, at least 4.
     ratio
         Instead of ``n_vertices``: vertices as a share of those of the prepared input.
+    max_error
+        Instead of ``n_vertices``: the largest distance between the surfaces, both ways, in model units. The smallest
+        number of vertices that does is searched for, to 3 %, by remeshing several times.
     options
         See :class:`RemeshOptions`; keyword arguments of the same names take precedence.
     on_step
@@ -82,48 +89,77 @@ def remesh(
     MetricError
         If given tensors are not symmetric positive definite.
     OptionError
-        If an option is out of range.
+        If an option is out of range, or no number of vertices within reason keeps to the error.
+    TimeLimitError
+        If the time limit was over before the optimisation began.
 
     References
     ----------
     "NASM: Neural Anisotropic Surface Meshing", SIGGRAPH Asia 2024.
     """
     options = _with_overrides(options or RemeshOptions(), overrides)
-    run = _Run(on_step or (lambda step: None))
+    clock = Clock(options.time_limit)
+    run = _Run(on_step or (lambda step: None), clock)
     given = as_surface(mesh, faces)
-    _check_count(n_vertices, ratio)
+    _check_count(n_vertices, ratio, max_error)
     with run.stage("prepare"):
         prepared = prepare(given, weld_tolerance=options.weld_tolerance)
-        n = n_vertices or max(MIN_VERTICES, round((ratio or 0.0) * prepared.surface.n_points))
+        tagged = np.zeros(len(prepared.surface.edges), dtype=bool)
+        if options.features is not None:
+            tagged = tagged_edges(given, options.features, prepared.surface, options.weld_tolerance)
+        wanted = options.metric
+        if not isinstance(wanted, str):
+            wanted = _at_prepared(np.asarray(wanted), given, prepared)
+    if max_error is not None:
+
+        def with_vertices(n: int) -> RemeshResult:
+            run.on_step(StepInfo(stage="search", message=f"{n:,} vertices"))
+            return _remesh(prepared, wanted, tagged, n, options, run)
+
+        return smallest_within(with_vertices, prepared.surface, max_error, clock)
+    n = n_vertices or max(MIN_VERTICES, round((ratio or 0.0) * prepared.surface.n_points))
+    return _remesh(prepared, wanted, tagged, n, options, run)
+
+
+def _remesh(
+    prepared: Prepared,
+    wanted: MetricName | npt.NDArray[np.float64],
+    tagged: EdgeMask,
+    n: int,
+    options: RemeshOptions,
+    run: _Run,
+) -> RemeshResult:
+    """Remesh a prepared surface with n vertices, given the metric's name or tensors at its points, and tagged edges."""
+    with run.stage("prepare"):
         frame = unit_frame(prepared.surface.points)
         unit = prepared.surface.with_points(frame.to_unit(prepared.surface.points))
         split = split_long_edges(unit, max_edge(unit, n), max_faces=max(MAX_GROWTH * unit.n_faces, MAX_SPLIT_FACES))
         working = split.surface
         _check_memory(n, working.n_faces)
     with run.stage("metric"):
-        wanted = options.metric
         if not isinstance(wanted, str):
-            wanted = split.interpolate(_at_prepared(np.asarray(wanted), given, prepared)) * frame.scale**2
+            wanted = split.interpolate(wanted) * frame.scale**2
         metric = compute_metric(working, wanted)
     with run.stage("embed"):
         embedding = embed(working, metric.tensors, max_iterations=options.embedding_iterations)
+    run.check_time()
     with run.stage("cvt"):
         voronoi = RestrictedVoronoi(embedding.points, working.faces, threads=options.threads)
         ordered = Surface(working.points, voronoi.faces)
-        boundary = Boundary(voronoi, ordered, n, options.crease_angle)
-        optimised = optimise(voronoi, n, ordered, boundary, embedding.scale, options, run.on_step)
+        features = _features(voronoi, ordered, n, edges_within(split, unit, tagged), options)
+        stop = partial(run.clock.over, OPTIMISATION_SHARE)
+        optimised = optimise(voronoi, n, ordered, features, embedding.scale, options, run.on_step, stop)
     with run.stage("dual"):
-        angle = options.crease_angle if options.sharpness > 1.0 else 180.0
         refined = refine(
             voronoi,
             optimised.sites,
             ordered,
             unit,
-            boundary,
+            features,
             embedding.scale,
             n_vertices=n,
-            crease_angle=angle,
             tensors=metric.tensors,
+            stop=run.clock.over,
         )
         surface = Surface(frame.to_model(refined.points), refined.faces)
         validity = check_validity(Surface(refined.points, refined.faces), unit)
@@ -144,8 +180,16 @@ def remesh(
         removed=refined.removed,
         validity=validity,
         seconds=run.total_seconds(),
-        warnings=tuple(_warnings(n, surface, refined, validity)),
+        warnings=tuple(_warnings(n, surface, refined, validity, optimised, options)),
     )
+
+
+def _features(
+    voronoi: RestrictedVoronoi, surface: Surface, n: int, tagged: EdgeMask, options: RemeshOptions
+) -> Features:
+    """Return boundary and creases; the plain CVT has none of the latter but those that are tagged."""
+    angle = options.feature_angle if options.sharpness > 1.0 else 180.0
+    return Features(voronoi, surface, n, sharp_edges(surface, angle) | tagged, tagged)
 
 
 def max_edge(surface: Surface, n_vertices: int) -> float:
@@ -157,75 +201,30 @@ def max_edge(surface: Surface, n_vertices: int) -> float:
     return min(EDGE_FACTOR * _even_edge(surface.area, n_vertices), 2.0 * _even_edge(surface.area, FINE_POINTS))
 
 
-def optimise(
-    voronoi: RestrictedVoronoi,
-    n: int,
-    surface: Surface,
-    boundary: Boundary,
-    scale: float,
-    options: RemeshOptions,
-    on_step: OnStep,
-) -> Optimised:
-    """Return n optimised sites: a random start, Lloyd's algorithm, then L-BFGS on the normal-metric energy.
-
-    With a normal metric the sites are drawn anew within Lloyd's algorithm, denser where the surface bends within a
-    cell, and a few of them are exchanged within L-BFGS, for points that the dual would miss. Sites of cells at the
-    boundary go onto it before L-BFGS and stay there.
-    """
-    late = options.max_iterations // 2 if options.final_sharpness is not None else 0
-    total = options.lloyd_iterations + options.max_iterations + late
-    done = 0
-
-    def report(iteration: int, energy: float) -> None:
-        on_step(StepInfo(stage="cvt", iteration=done + iteration, total=total, energy=energy))
-
-    rng = np.random.default_rng(options.seed)
-    sites = sample_surface(voronoi.points, voronoi.faces, voronoi.facets.area, n, rng)
-    first = options.lloyd_iterations - options.lloyd_iterations // 3
-    sites = lloyd(voronoi, sites, first, report)
-    done += first
-    if options.sharpness > 1.0:
-        sites = resample_by_energy(voronoi, sites, DENSITY_SHARPNESS * options.sharpness, rng)
-    sites = lloyd(voronoi, sites, options.lloyd_iterations - first, report)
-    done += options.lloyd_iterations - first
-    schedule = [(options.sharpness, options.max_iterations)]
-    if options.sharpness > 1.0:
-        before = round(EXCHANGE_AT * options.max_iterations)
-        schedule = [(options.sharpness, before), (options.sharpness, options.max_iterations - before)]
-    if options.final_sharpness is not None:
-        schedule.append((options.final_sharpness, late))
-    iterations = evaluations = 0
-    fixed = np.zeros(n, dtype=bool)
-    for stage, (sharpness, limit) in enumerate(schedule):
-        if stage > 0 and options.sharpness > 1.0:
-            sites = exchange_sites(voronoi, sites, surface, scale, sharpness, kept=fixed)
-        if boundary.curves.n_curves:
-            sites, fixed = boundary.spread(voronoi, sites, fixed)
-        result = minimise(voronoi, sites, sharpness=sharpness, max_iterations=limit, on_step=report, fixed=fixed)
-        sites = result.sites
-        done += limit
-        iterations += result.iterations
-        evaluations += result.evaluations
-    return replace(result, iterations=iterations, evaluations=evaluations)
-
-
 class _Run:
-    """Stage times and progress of one run."""
+    """Stage times, time limit and progress of one run."""
 
-    def __init__(self, on_step: OnStep) -> None:
+    def __init__(self, on_step: OnStep, clock: Clock) -> None:
         self.on_step = on_step
+        self.clock = clock
         self._seconds = {"load": 0.0}
-        self._start = time.perf_counter()
 
     @contextmanager
     def stage(self, name: str) -> Iterator[None]:
         self.on_step(StepInfo(stage=name))
         start = time.perf_counter()
         yield
-        self._seconds[name] = time.perf_counter() - start
+        self._seconds[name] = self._seconds.get(name, 0.0) + time.perf_counter() - start
+
+    def check_time(self) -> None:
+        if self.clock.over(OPTIMISATION_SHARE):
+            raise TimeLimitError(
+                f"the time limit of {self.clock.limit:g} s was as good as over before the optimisation began (after "
+                f"{self.clock.seconds:.1f} s); give more time, or ask for fewer vertices"
+            )
 
     def total_seconds(self) -> dict[str, float]:
-        return {**self._seconds, "total": time.perf_counter() - self._start}
+        return {**self._seconds, "total": self.clock.seconds}
 
 
 def _with_overrides(options: RemeshOptions, overrides: dict[str, Any]) -> RemeshOptions:
@@ -236,9 +235,11 @@ def _with_overrides(options: RemeshOptions, overrides: dict[str, Any]) -> Remesh
     return replace(options, **overrides)
 
 
-def _check_count(n_vertices: int | None, ratio: float | None) -> None:
-    if (n_vertices is None) == (ratio is None):
-        raise OptionError("give either n_vertices or ratio")
+def _check_count(n_vertices: int | None, ratio: float | None, max_error: float | None) -> None:
+    if (n_vertices, ratio, max_error).count(None) != 2:
+        raise OptionError("give one of n_vertices, ratio and max_error")
+    if max_error is not None and not (np.isfinite(max_error) and max_error > 0.0):
+        raise OptionError(f"max_error = {max_error}; expected a positive length in model units")
     if n_vertices is not None and (n_vertices != int(n_vertices) or n_vertices < MIN_VERTICES):
         raise OptionError(f"n_vertices = {n_vertices}; expected a whole number of at least {MIN_VERTICES}")
     if ratio is not None and not (np.isfinite(ratio) and ratio > 0.0):
@@ -268,7 +269,12 @@ def _at_prepared(tensors: npt.NDArray[Any], given: Surface, prepared: Prepared) 
     return np.asarray(tensors[prepared.point_source], dtype=np.float64)
 
 
-def _warnings(n: int, surface: Surface, refined: Refined, validity: Validity) -> Iterator[str]:
+def _warnings(
+    n: int, surface: Surface, refined: Refined, validity: Validity, optimised: Optimised, options: RemeshOptions
+) -> Iterator[str]:
+    if optimised.status is Status.TIME_LIMIT:
+        count = optimised.iterations
+        yield f"the time limit of {options.time_limit:g} s ended the optimisation after {count} iterations"
     if refined.from_input:
         yield (
             f"{n:,} vertices are too few for cells that are disks; the input itself was coarsened instead, and its "

@@ -47,6 +47,8 @@ class RemeshResult:
         Points that were added to make the mesh valid, and points taken away to keep to the number asked for.
     validity
         Checks of the result against the prepared input.
+    distance
+        The largest distance from the input found, both ways, in model units; None unless a largest one was asked for.
     seconds
         Wall-clock seconds per stage.
     warnings
@@ -70,6 +72,7 @@ class RemeshResult:
     validity: Validity
     seconds: dict[str, float]
     warnings: tuple[str, ...]
+    distance: float | None = None
 
     def report(self) -> dict[str, Any]:
         """Return the figures of the run as a dictionary that JSON can hold."""
@@ -78,6 +81,7 @@ class RemeshResult:
             "vertices": self.surface.n_points,
             "faces": self.surface.n_faces,
             "seconds": dict(self.seconds),
+            "distance": self.distance,
             "energy": self.energy,
             "iterations": self.iterations,
             "status": self.status.value,

@@ -30,7 +30,7 @@ def refuse(capsys, monkeypatch, tmp_path):
     ("words", "expected"),
     [
         ([], "-n"),
-        (["-n", "100", "--ratio", "0.5"], "both"),
+        (["-n", "100", "--ratio", "0.5"], "give one of"),
         (["-n", "0"], "--vertices"),
         (["-n", "-5"], "--vertices"),
         (["-n", "many"], "--vertices"),

@@ -156,8 +156,8 @@ def test_an_exception_in_the_callback_ends_the_work(ring):
 @pytest.mark.parametrize(
     ("options", "words"),
     [
-        ({}, "either n_vertices or ratio"),
-        ({"n_vertices": 100, "ratio": 0.5}, "either n_vertices or ratio"),
+        ({}, "give one of n_vertices, ratio and max_error"),
+        ({"n_vertices": 100, "ratio": 0.5}, "give one of n_vertices, ratio and max_error"),
         ({"n_vertices": 3}, "at least 4"),
         ({"n_vertices": 0}, "at least 4"),
         ({"n_vertices": 10.5}, "whole number"),
@@ -167,7 +167,7 @@ def test_an_exception_in_the_callback_ends_the_work(ring):
         ({"n_vertices": 100, "metric": "fancy"}, "expected one of curvature"),
         ({"n_vertices": 100, "embedding": "neural"}, "expected 'direct'"),
         ({"n_vertices": 100, "threads": 0}, "at least 1"),
-        ({"n_vertices": 100, "crease_angle": 200.0}, "0 to 180"),
+        ({"n_vertices": 100, "feature_angle": 200.0}, "0 to 180"),
         ({"n_vertices": 100, "sharpnes": 7}, "no option 'sharpnes'"),
     ],
 )

@@ -5,12 +5,14 @@ import numpy as np
 import pytest
 from tests.reference import naive_rvd as naive
 
-from anisomesh.cvt.arcs import Boundary
+from anisomesh.cvt.boundary import Boundary
+from anisomesh.cvt.features import Features
 from anisomesh.cvt.optimise import lloyd, minimise
 from anisomesh.cvt.voronoi import RestrictedVoronoi
 from anisomesh.pipeline import remesh
 from anisomesh.surface import topology
 from anisomesh.surface.boundary import boundary_curves
+from anisomesh.surface.features import sharp_edges
 from anisomesh.surface.mesh import Surface
 from anisomesh.surface.shapes import open_patch, sphere
 
@@ -74,7 +76,7 @@ OPEN = {
 
 
 def curves_of(surface):
-    return boundary_curves(surface.points, surface.faces, surface.face_neighbours)
+    return boundary_curves(surface.points, surface)
 
 
 def distance_to_boundary(points, surface):
@@ -133,7 +135,7 @@ def test_arcs_divide_the_boundary_among_the_nearest_sites(name, n_sites):
     voronoi = RestrictedVoronoi(surface.points, surface.faces)
     sites = naive.random_sites(surface.points, surface.faces, n_sites, np.random.default_rng(n_sites))
     ordered = Surface(surface.points, voronoi.faces)
-    boundary = Boundary(voronoi, ordered, n_sites, 45.0)
+    boundary = Boundary(voronoi, ordered, n_sites, sharp_edges(ordered, 45.0))
     arcs = boundary.arcs(voronoi.diagram(sites))
     total = np.bincount(arcs.curve, arcs.length, minlength=boundary.curves.n_curves)
     low, high = boundary.curves.limits.T
@@ -171,14 +173,18 @@ def test_drawn_sites_are_on_the_boundary_one_for_each_long_arc():
     surface = square(24)
     voronoi = RestrictedVoronoi(surface.points, surface.faces)
     sites = naive.random_sites(surface.points, surface.faces, 100, np.random.default_rng(0))
-    boundary = Boundary(voronoi, Surface(surface.points, voronoi.faces), 100, 45.0)
-    drawn, there = boundary.spread(voronoi, lloyd(voronoi, sites, 5), np.zeros(100, dtype=bool))
+    ordered = Surface(surface.points, voronoi.faces)
+    none = np.zeros(len(ordered.edges), dtype=bool)
+    features = Features(voronoi, ordered, 100, none, none)
+    nowhere = np.zeros(100, dtype=bool)
+    drawn, there, on_crease = features.spread(voronoi, lloyd(voronoi, sites, 5), nowhere, nowhere)
+    assert not on_crease.any()
     assert np.all(distance_to_boundary(drawn[there], surface) < 1e-12)
     assert np.all(distance_to_boundary(drawn[~there], surface) > 0.02)
     corners = np.array([[x, y, 0.0] for x in (0.0, 1.0) for y in (0.0, 1.0)])
     assert np.linalg.norm(drawn[:, None] - corners[None], axis=2).min(axis=0).max() < 1e-12
     # four sides of 1 at the distance of a hexagonal lattice of 100 sites
-    assert there.sum() == pytest.approx(4.0 / boundary.spacing, rel=0.2)
+    assert there.sum() == pytest.approx(4.0 / features.boundary.spacing, rel=0.2)
 
 
 @pytest.mark.parametrize("sharpness", [1.0, 7.0])

@@ -5,13 +5,14 @@ import numpy as np
 import pytest
 from dual_cases import assert_closed_manifold
 
-from anisomesh.cvt.arcs import Boundary
+from anisomesh.cvt.features import Features
 from anisomesh.cvt.optimise import lloyd
 from anisomesh.cvt.voronoi import RestrictedVoronoi
 from anisomesh.dual.cells import cells_of
 from anisomesh.dual.refine import refine
 from anisomesh.metric.tensor import uniform_metric
 from anisomesh.surface import shapes, topology
+from anisomesh.surface.features import sharp_edges
 from anisomesh.surface.mesh import Surface
 
 CASES = {
@@ -33,15 +34,15 @@ def case(shape, n=None):
 
 
 def mended(voronoi, sites, surface, scale=1.0, crease_angle=180.0):
+    sharp = sharp_edges(surface, crease_angle)
     return refine(
         voronoi,
         sites,
         surface,
         surface,
-        Boundary(voronoi, surface, len(sites), crease_angle),
+        Features(voronoi, surface, len(sites), sharp, np.zeros_like(sharp)),
         scale,
         n_vertices=len(sites),
-        crease_angle=crease_angle,
         tensors=uniform_metric(surface),
     )
 

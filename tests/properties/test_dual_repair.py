@@ -7,7 +7,7 @@ from anisomesh.cvt.voronoi import RestrictedVoronoi
 from anisomesh.dual.cells import cells_of
 from anisomesh.dual.decimate import collapsible_edges, decimate
 from anisomesh.dual.exchange import exchange_sites
-from anisomesh.dual.place import crease_positions, creased_cells, snap_to_missed
+from anisomesh.dual.place import cells_with_crease, crease_positions, snap_to_missed
 from anisomesh.dual.simplicial import simplicial_mesh
 from anisomesh.dual.triangulate import dual_mesh
 from anisomesh.dual.untangle import untangle
@@ -35,7 +35,7 @@ def assert_same_topology(result, reference):
 def test_decimation_reaches_the_number_and_keeps_topology_and_side(name, share):
     surface = SHAPES[name]
     n = int(share * surface.n_points)
-    points, faces = decimate(surface.points, surface.faces, n, ClosestPoints(surface))
+    points, faces, _ = decimate(surface.points, surface.faces, n, ClosestPoints(surface))
     result = Surface(points, faces)
     assert result.n_points == n
     assert_same_topology(result, surface)
@@ -46,7 +46,7 @@ def test_decimation_reaches_the_number_and_keeps_topology_and_side(name, share):
 
 def test_decimation_of_a_box_keeps_its_corners_until_the_end():
     surface = box(n=6)
-    points, faces = decimate(surface.points, surface.faces, 8, ClosestPoints(surface))
+    points, faces, _ = decimate(surface.points, surface.faces, 8, ClosestPoints(surface))
     assert len(points) == 8
     np.testing.assert_allclose(np.sort(np.abs(points - 0.5).ravel()), 0.5)
     assert Surface(points, faces).area == pytest.approx(surface.area)
@@ -54,7 +54,7 @@ def test_decimation_of_a_box_keeps_its_corners_until_the_end():
 
 def test_decimation_stops_where_nothing_can_go():
     tetrahedron = Surface(np.vstack([np.zeros(3), np.eye(3)]), np.array([[0, 2, 1], [0, 1, 3], [0, 3, 2], [1, 2, 3]]))
-    points, faces = decimate(tetrahedron.points, tetrahedron.faces, 1, ClosestPoints(tetrahedron))
+    points, faces, _ = decimate(tetrahedron.points, tetrahedron.faces, 1, ClosestPoints(tetrahedron))
     assert len(points) == 4
     assert len(faces) == 4
 
@@ -62,7 +62,7 @@ def test_decimation_stops_where_nothing_can_go():
 def test_decimation_keeps_the_boundary_loop():
     surface = open_patch(lambda x, y: 0.3 * x * y, n=16)
     n = surface.n_points // 3
-    points, faces = decimate(surface.points, surface.faces, n, ClosestPoints(surface))
+    points, faces, _ = decimate(surface.points, surface.faces, n, ClosestPoints(surface))
     result = Surface(points, faces)
     validity = check_validity(result, surface)
     assert validity.boundary_loops == 1
@@ -71,7 +71,7 @@ def test_decimation_keeps_the_boundary_loop():
 
 def test_link_condition_against_sets():
     surface = SHAPES["torus"]
-    small, faces = decimate(surface.points, surface.faces, 40, ClosestPoints(surface))
+    small, faces, _ = decimate(surface.points, surface.faces, 40, ClosestPoints(surface))
     mesh = Surface(small, faces)
 
     def link(vertices):
@@ -124,7 +124,7 @@ def _box_dual(n_sites, seed=0):
 
 def test_vertices_of_creased_cells_go_to_where_their_planes_meet():
     surface, voronoi, diagram, cells = _box_dual(120)
-    chosen = creased_cells(diagram, cells, surface, sharp_edges(surface, 45.0))
+    chosen = cells_with_crease(diagram, cells, surface, sharp_edges(surface, 45.0))
     places = crease_positions(voronoi, diagram, cells, 1.0, chosen)
     normals = np.abs(voronoi.facets.normal[diagram.facet]).round().astype(bool)
     axes = np.zeros((len(cells.site), 3), dtype=bool)
@@ -146,7 +146,7 @@ def test_no_edge_of_a_box_is_sharper_than_a_right_angle(angle):
     surface, _, diagram, cells = _box_dual(30)
     sharp = sharp_edges(surface, angle)
     assert not sharp.any()
-    assert len(creased_cells(diagram, cells, surface, sharp)) == 0
+    assert len(cells_with_crease(diagram, cells, surface, sharp)) == 0
 
 
 def test_corners_of_a_box_are_its_corners():
@@ -167,7 +167,7 @@ def test_missed_corners_are_met_after_snapping():
     after = np.sqrt(ClosestPoints(Surface(snapped, faces)).squared_distances(ends))
     assert before.max() > 0.01
     assert (after < 1e-9).sum() > (before < 1e-9).sum()
-    unmoved = np.setdiff1d(np.arange(len(points)), creased_cells(diagram, cells, surface, sharp))
+    unmoved = np.setdiff1d(np.arange(len(points)), cells_with_crease(diagram, cells, surface, sharp))
     np.testing.assert_array_equal(snapped[unmoved], points[unmoved])
     total = [ClosestPoints(Surface(p, faces)).squared_distances(surface.points).sum() for p in (points, snapped)]
     assert total[1] < total[0]
@@ -212,7 +212,7 @@ def test_decimation_of_a_square_tube_leaves_no_needle_and_no_turned_face():
     path = np.cumsum(np.repeat(steps, 2, axis=0), axis=0)
     surface = cubes_boundary(np.unique(path, axis=0))
     assert_same_topology(surface, surface)
-    points, faces = decimate(surface.points, surface.faces, 8, ClosestPoints(surface))
+    points, faces, _ = decimate(surface.points, surface.faces, 8, ClosestPoints(surface))
     result = Surface(points, faces)
     assert_same_topology(result, surface)
     assert result.n_points < 0.9 * surface.n_points
@@ -247,6 +247,6 @@ def test_a_component_of_one_triangle_is_not_collapsed():
     points = np.concatenate([ball.points, [[3.0, 0, 0], [4, 0, 0], [3, 1, 0]]])
     faces = np.concatenate([ball.faces, np.arange(ball.n_points, ball.n_points + 3, dtype=np.int32)[None]])
     reference = ClosestPoints(Surface(points, faces))
-    _, coarse = decimate(points, faces, 10, reference)
+    _, coarse, _ = decimate(points, faces, 10, reference)
     assert topology.connected_components(coarse, coarse.max() + 1)[0] == 2
     assert topology.euler_characteristic(coarse) == 3

@@ -17,6 +17,7 @@ _LABELS = {
     "embed": "embedding",
     "cvt": "moving the sites",
     "dual": "building the triangles",
+    "search": "looking for a number:",
 }
 _SECONDS_BETWEEN_LINES = 5.0
 

@@ -10,6 +10,7 @@ import typer
 
 from anisomesh.cli.arguments import (
     FinalSharpness,
+    Length,
     Metric,
     MetricName,
     Quiet,
@@ -19,6 +20,7 @@ from anisomesh.cli.arguments import (
     Source,
     Threads,
     Vertices,
+    positive,
     remesh_options,
 )
 from anisomesh.cli.job import Outputs, read, run_remesh
@@ -37,12 +39,29 @@ def command(
     out: Annotated[Path, typer.Option("--out", "-o", metavar="OUT", help="Mesh to write; the suffix is the format.")],
     n_vertices: Vertices = None,
     ratio: Ratio = None,
+    max_error: Annotated[
+        str | None,
+        typer.Option(
+            metavar="LENGTH",
+            help="Instead of a number: fewest vertices within this distance, in model units or % of the diagonal.",
+        ),
+    ] = None,
     metric: MetricName = Metric.curvature,
     sharpness: Sharpness = 7.0,
     final_sharpness: FinalSharpness = None,
+    feature_angle: Annotated[
+        float, typer.Option(min=0.0, max=180.0, help="Edges that bend by more degrees are creases; 180 for none.")
+    ] = 40.0,
+    features: Annotated[
+        Path | None,
+        typer.Option(metavar="FILE", help="Edges to keep: a text file, two vertex numbers a line, the first is 0."),
+    ] = None,
     embedding: Annotated[Embedding, typer.Option(help="How the surface is embedded.")] = Embedding.direct,
     seed: Seed = 0,
     threads: Threads = 2,
+    time_limit: Annotated[
+        float | None, typer.Option(callback=positive, help="Seconds after which the work ends with what it has.")
+    ] = None,
     report: Annotated[Path | None, typer.Option(metavar="JSON", help="Write the report to this file.")] = None,
     rvd: Annotated[
         Path | None, typer.Option(metavar="FILE", help="Write the Voronoi cells on the surface: .vtu or .obj.")
@@ -55,16 +74,23 @@ def command(
     quiet: Quiet = False,
 ) -> None:
     """Remesh IN with anisotropic triangles and write the result to OUT."""
-    if (n_vertices is None) == (ratio is None):
-        raise typer.BadParameter("give either -n (number of vertices) or --ratio, and not both")
+    if (n_vertices, ratio, max_error).count(None) != 2:
+        raise typer.BadParameter("give one of -n (number of vertices), --ratio and --max-error")
+    error = None if max_error is None else Length.parse(max_error, "--max-error")
     outputs = Outputs(mesh=out, report=report, rvd=rvd, picture=picture)
     outputs.check()
-    options = remesh_options(metric, sharpness, final_sharpness, seed, threads) | {"embedding": embedding.value}
+    options = remesh_options(metric, sharpness, final_sharpness, seed, threads)
+    options |= {"embedding": embedding.value, "feature_angle": feature_angle, "time_limit": time_limit}
     with progress(quiet) as display:
         surface, seconds = read(source)
-        result, facts = run_remesh(
-            surface, display, name=str(source), load_seconds=seconds, n_vertices=n_vertices, ratio=ratio, **options
-        )
+        if features is not None:
+            from anisomesh.surface.tagged import load_pairs
+
+            options["features"] = load_pairs(features)
+        options |= {"n_vertices": n_vertices, "ratio": ratio}
+        options["max_error"] = None if error is None else error.on(surface)
+        result, facts = run_remesh(surface, display, name=str(source), load_seconds=seconds, **options)
+        facts["options"]["features"] = None if features is None else str(features)
         outputs.write(result, facts, display)
     if json_:
         typer.echo(as_json(facts))

@@ -66,6 +66,7 @@ def summary(report: dict[str, Any], written: Sequence[Path], notes: Sequence[str
         ("vertices", f"{report['vertices']:,} (asked for {report['vertices_asked']:,})"),
         ("faces", f"{report['faces']:,}"),
         ("surface", describe_validity(report["validity"])),
+        *([("distance", f"{report['distance']:.4g} from the input at most")] if report.get("distance") else []),
         ("stretch", f"mean {stretch['mean']:.2f}, largest {stretch['max']:.2f} (1 = equilateral)"),
         ("optimiser", f"{counted(report['iterations'], 'iteration')}{energy}: {report['status']}"),
         ("seconds", f"{seconds['total']:.2f} ({stages})"),

@@ -11,6 +11,7 @@ import numpy as np
 import numpy.typing as npt
 
 from anisomesh._arrays import Sites
+from anisomesh.clock import Stop, never
 from anisomesh.cvt.voronoi import Evaluation, RestrictedVoronoi
 
 _ARMIJO = 1e-4
@@ -22,7 +23,8 @@ class Status(StrEnum):
     """Why an optimisation stopped."""
 
     CONVERGED = "converged"
-    ITERATION_LIMIT = "iteration limit reached; raise max_iterations for a lower energy"
+    ITERATION_LIMIT = "all iterations done; more (max_iterations) would lower the energy a little"
+    TIME_LIMIT = "ended by the time limit"
     NO_DESCENT = "no step lowers the energy further: a kink of the energy, or the limit of floating point"
 
 
@@ -70,6 +72,7 @@ def minimise(
     tolerance: float = 1e-4,
     on_step: Step | None = None,
     fixed: Mask | None = None,
+    stop: Stop = never,
 ) -> Optimised:
     """Minimise the normal-metric CVT energy from these sites by L-BFGS.
 
@@ -93,6 +96,8 @@ def minimise(
         Called with iteration and energy after every iteration.
     fixed
         Sites that stay where they are (S,).
+    stop
+        Asked before every iteration whether it is the last one.
 
     Notes
     -----
@@ -117,6 +122,9 @@ def minimise(
     while iteration < max_iterations:
         if _relative_gradient(here) < tolerance:
             status = Status.CONVERGED
+            break
+        if stop():
+            status = Status.TIME_LIMIT
             break
         direction = _direction(here, pairs)
         slope = _dot(here.gradient, direction)

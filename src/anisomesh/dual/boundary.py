@@ -3,18 +3,17 @@
 from __future__ import annotations
 
 import numpy as np
-import numpy.typing as npt
 
 from anisomesh._arrays import EmbeddedPoints, PointMask, Points, Sites
-from anisomesh.cvt.arcs import Arcs
+from anisomesh.cvt.arcs import nearest_to_sites
+from anisomesh.cvt.boundary import BoundaryArcs
 from anisomesh.dual.cells import Cells
 from anisomesh.surface.boundary import BoundaryCurves
 
-_SAMPLES = 32  # of an arc, for the point closest to its site
 MIN_ARCS = 3  # of a boundary curve, so that the dual has a loop there
 
 
-def points_on_boundary(arcs: Arcs, curves: BoundaryCurves, cells: Cells, sites: Sites) -> EmbeddedPoints:
+def points_on_boundary(arcs: BoundaryArcs, curves: BoundaryCurves, cells: Cells, sites: Sites) -> EmbeddedPoints:
     """Return points of the boundary (n, d) that are missing as sites.
 
     A component of a cell with several arcs would pinch the dual, and a boundary curve of fewer than three arcs has no
@@ -30,21 +29,10 @@ def points_on_boundary(arcs: Arcs, curves: BoundaryCurves, cells: Cells, sites: 
     order = np.lexsort((arcs.length, arcs.curve))
     longest = order[np.searchsorted(arcs.curve[order], few, side="right") - 1]
     quarters = [curves.at(arcs.start[longest] + share * arcs.length[longest], few) for share in (0.25, 0.75)]
-    return np.concatenate([_nearest(arcs, curves, torn, sites), *quarters, arcs.second])
+    return np.concatenate([nearest_to_sites(arcs, curves, torn, sites), *quarters, arcs.second])
 
 
-def _nearest(arcs: Arcs, curves: BoundaryCurves, which: npt.NDArray[np.int64], sites: Sites) -> EmbeddedPoints:
-    """Return the point of each of these arcs (n,) that is closest to its site (n, d), within a share of the arc."""
-    shares = (np.arange(_SAMPLES) + 0.5) / _SAMPLES
-    places = arcs.start[which, None] + shares * arcs.length[which, None]
-    points = curves.at(places.ravel(), np.repeat(arcs.curve[which], _SAMPLES)).reshape(
-        len(which), _SAMPLES, sites.shape[1]
-    )
-    distance = np.linalg.norm(points - sites[arcs.site[which], None], axis=2)
-    return np.asarray(points[np.arange(len(which)), np.argmin(distance, axis=1)])
-
-
-def put_on_boundary(points: Points, arcs: Arcs, cells: Cells) -> tuple[Points, PointMask]:
+def put_on_boundary(points: Points, arcs: BoundaryArcs, cells: Cells) -> tuple[Points, PointMask]:
     """Return the vertices of the dual (V, d), those of cells at the boundary on their arcs, and which these are (V,).
 
     The vertex goes to the sharpest corner in the arc, or else to the middle of it; of several arcs the longest counts.

@@ -10,6 +10,7 @@ from anisomesh._arrays import Faces, PointMask, Points
 from anisomesh.surface import geometry
 from anisomesh.surface.closest import ClosestPoints
 from anisomesh.surface.mesh import Surface
+from anisomesh.surface.topology import edge_keys
 
 _LENGTH_WEIGHT = 1e-3  # of the squared length against the squared distance to the planes
 _MIN_COSINE = 0.2  # a face turns by no more than this in one collapse
@@ -19,11 +20,18 @@ _ENOUGH = 0.002  # of the points are a round worth while
 
 Floats = npt.NDArray[np.float64]
 Ints = npt.NDArray[np.int64]
+Links = npt.NDArray[np.int64]
 
 
 def decimate(
-    points: Points, faces: Faces, n_points: int, reference: ClosestPoints, *, kept: PointMask | None = None
-) -> tuple[Points, Faces]:
+    points: Points,
+    faces: Faces,
+    n_points: int,
+    reference: ClosestPoints,
+    *,
+    kept: PointMask | None = None,
+    creases: Links | None = None,
+) -> tuple[Points, Faces, Links]:
     """Collapse edges until no more than ``n_points`` points are left, or none can go.
 
     Parameters
@@ -36,11 +44,13 @@ def decimate(
         The surface that the mesh stands for; no collapse makes a face that is turned away from it.
     kept
         Points that do not go (V,).
+    creases
+        Edges (n, 2) that stay: of their points only those that two of them meet at may go, and only along them.
 
     Returns
     -------
-    points, faces
-        The coarser mesh, whose points are some of those given.
+    points, faces, creases
+        The coarser mesh, whose points are some of those given, and what is left of the creases.
 
     Notes
     -----
@@ -50,13 +60,14 @@ def decimate(
     link condition (Dey, Edelsbrunner, Guha, Nekhayev 1999), so topology, orientation and boundary loops stay, and
     no face turns by more than about 80 degrees.
     """
-    quadrics = _quadrics(Surface(points, faces))
+    links = np.zeros((0, 2), dtype=np.int64) if creases is None else creases
+    quadrics = _quadrics(Surface(points, faces), links)
     surplus = len(points) - n_points
     refused = np.zeros(0, dtype=np.int64)
     kept = kept if kept is not None else np.zeros(len(points), dtype=bool)
     while surplus > 0:
         surface = Surface(points, faces)
-        gone, into, refused = _collapses(surface, quadrics, surplus, reference, kept, refused)
+        gone, into, refused = _collapses(surface, quadrics, surplus, reference, kept, links, refused)
         if len(gone) == 0:
             break
         around = np.unique(faces[np.isin(faces, gone).any(axis=1)])
@@ -64,21 +75,24 @@ def decimate(
         np.add.at(quadrics, into, quadrics[gone])
         target = np.arange(len(points), dtype=np.int32)
         target[gone] = into
+        links = target[links].astype(np.int64)
+        links = links[links[:, 0] != links[:, 1]]
         faces = target[faces]
         faces = faces[(faces != np.roll(faces, 1, axis=1)).all(axis=1)]
         surplus -= len(gone)
     used, faces = np.unique(faces, return_inverse=True)
-    return points[used], faces.reshape(-1, 3).astype(np.int32)
+    return points[used], faces.reshape(-1, 3).astype(np.int32), np.searchsorted(used, links)
 
 
-def _quadrics(surface: Surface) -> Floats:
+def _quadrics(surface: Surface, links: Ints) -> Floats:
     """Return the sum of weight times squared plane at each point (V, 4, 4).
 
-    The planes are those of the faces, weighted by area, and at a boundary edge the one upright on the face through the
-    edge, weighted by squared length.
+    The planes are those of the faces, weighted by area, and at a boundary edge or a link the one upright on the face
+    through the edge, weighted by squared length.
     """
     points, side, face = surface.points, surface.edges, surface.edge_faces[:, 0]
-    rim = np.flatnonzero(surface.edge_face_count == 1)
+    linked = np.isin(edge_keys(surface.edges), edge_keys(links))
+    rim = np.flatnonzero((surface.edge_face_count == 1) | linked)
     along = points[side[rim, 1]] - points[side[rim, 0]]
     upright = geometry.unit(np.cross(along, surface.face_normals[face[rim]]))
     result = np.zeros((surface.n_points, 4, 4))
@@ -94,7 +108,13 @@ def _quadrics(surface: Surface) -> Floats:
 
 
 def _collapses(
-    surface: Surface, quadrics: Floats, surplus: int, reference: ClosestPoints, kept: PointMask, refused: Ints
+    surface: Surface,
+    quadrics: Floats,
+    surplus: int,
+    reference: ClosestPoints,
+    kept: PointMask,
+    links: Links,
+    refused: Ints,
 ) -> tuple[Ints, Ints, Ints]:
     """Return points to remove and where each goes: cheap, allowed, and with neighbourhoods that do not touch.
 
@@ -104,6 +124,9 @@ def _collapses(
     gone, into = np.concatenate([edges, edges[:, ::-1]]).T
     allowed = ~kept[gone] & (~surface.on_boundary[gone] | surface.on_boundary[into])
     allowed &= ~np.isin(gone * surface.n_points + into, refused)
+    n_links = np.bincount(links.ravel(), minlength=surface.n_points)
+    along = np.isin(edge_keys(np.stack([gone, into], axis=1)), edge_keys(links))
+    allowed &= (n_links[gone] == 0) | (along & (n_links[gone] == 2))
     gone, into = gone[allowed], into[allowed]
     place = np.concatenate([surface.points[into], np.ones((len(into), 1))], axis=1)
     area = np.bincount(surface.faces.ravel(), np.repeat(surface.face_areas, 3), minlength=surface.n_points)

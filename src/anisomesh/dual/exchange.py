@@ -7,14 +7,18 @@ import numpy.typing as npt
 from scipy.spatial import cKDTree
 
 from anisomesh._arrays import Sites
+from anisomesh.cvt.arcs import Mask
+from anisomesh.cvt.features import Features
 from anisomesh.cvt.voronoi import RestrictedVoronoi
 from anisomesh.dual.cells import cells_of
+from anisomesh.dual.creases import creased_cells
 from anisomesh.dual.triangulate import dual_mesh
 from anisomesh.surface.closest import ClosestPoints
 from anisomesh.surface.mesh import Surface
 
 _SHARE = 0.02  # of the sites, at most, that are exchanged
 _WORTH = 4.0  # a point is missed if its squared distance is that many times the mean
+_CREASE_SHARE = 0.2  # of the sites that are not on boundary or creases, at most, that go to creases at once
 _POOL = 20  # candidates looked at per site exchanged
 
 
@@ -67,6 +71,40 @@ def exchange_sites(
     result = np.array(sites)
     result[old] = voronoi.points[new[: len(old)]]
     return result
+
+
+def bring_to_creases(
+    voronoi: RestrictedVoronoi,
+    sites: Sites,
+    surface: Surface,
+    features: Features,
+    sharpness: float,
+    on_boundary: Mask,
+    on_crease: Mask,
+) -> tuple[Sites, Mask]:
+    """Return as many sites (S, d), some of them moved to where a cell has more of a crease than fits it, and a mask.
+
+    Parameters
+    ----------
+    voronoi, sites, surface, sharpness
+        As above.
+    features
+        Boundary and creases of the surface.
+    on_boundary, on_crease
+        Sites that are there already and stay (S,). Those that come to a crease are added to the second in the result.
+    """
+    diagram = voronoi.diagram(sites)
+    cells = cells_of(diagram, surface.face_neighbours, voronoi.facets.area)
+    rim, arcs = features.boundary.arcs(diagram), features.creases.arcs(diagram)
+    missing = creased_cells(features.creases, arcs, rim, cells, sites).missing
+    order = np.argsort(voronoi.evaluate(sites, sharpness).cell_energy, kind="stable")
+    order = order[~(on_boundary | on_crease)[order]]
+    n = min(len(missing), int(_CREASE_SHARE * len(order)))
+    spacing = float(np.sqrt(voronoi.facets.area.sum() / len(sites)))
+    gone = _spaced(sites, order, n, spacing)
+    moved, there = np.array(sites), np.array(on_crease)
+    moved[gone], there[gone] = missing[: len(gone)], True
+    return moved, there
 
 
 def _spaced(

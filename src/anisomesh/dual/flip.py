@@ -12,6 +12,7 @@ from anisomesh.evaluation.quality import anisotropic_quality
 from anisomesh.surface import geometry
 from anisomesh.surface.closest import ClosestPoints
 from anisomesh.surface.mesh import Surface
+from anisomesh.surface.topology import edge_keys
 
 _MAX_ROUNDS = 20
 _MIN_GAIN = 1e-3  # of the sum of the qualities of the two triangles
@@ -53,8 +54,8 @@ def possible_flips(surface: Surface, edges: npt.NDArray[np.integer]) -> Flips:
     corner = np.argmax(surface.face_edges[pair[:, 0]] == edges[:, None], axis=1)
     a, x, y = (faces[pair[:, 0], (corner + k) % 3] for k in range(3))
     b = faces[pair[:, 1]].sum(axis=1) - x - y
-    known = _edge_keys(surface.edges, surface.n_points)
-    free = (a != b) & ~np.isin(_edge_keys(np.stack([a, b], axis=1), surface.n_points), known)
+    known = edge_keys(surface.edges)
+    free = (a != b) & ~np.isin(edge_keys(np.stack([a, b], axis=1)), known)
     triangles = np.stack([np.stack([a, x, b], axis=1), np.stack([a, b, y], axis=1)], axis=1)
     return Flips(pair, np.stack([x, y], axis=1), np.stack([a, b], axis=1), triangles).take(free)
 
@@ -77,7 +78,9 @@ def do_flips(faces: Faces, flips: Flips, order: Ints) -> Faces:
     return changed
 
 
-def flip_for_shape(points: Points, faces: Faces, roots: PointTensors, reference: ClosestPoints) -> Faces:
+def flip_for_shape(
+    points: Points, faces: Faces, roots: PointTensors, reference: ClosestPoints, *, kept: Ints | None = None
+) -> Faces:
     """Return the faces (F, 3) after flips of edges that give better triangles in the metric.
 
     Parameters
@@ -88,6 +91,8 @@ def flip_for_shape(points: Points, faces: Faces, roots: PointTensors, reference:
         Symmetric square roots of the metric at the points (V, 3, 3).
     reference
         The surface that the mesh stands for.
+    kept
+        Edges (n, 2) that stay.
 
     Notes
     -----
@@ -97,9 +102,12 @@ def flip_for_shape(points: Points, faces: Faces, roots: PointTensors, reference:
     crease does. The sum over the mesh grows with every flip, so the rounds end.
     """
     active = np.ones(len(faces), dtype=bool)
+    keys = edge_keys(np.zeros((0, 2), dtype=np.int64) if kept is None else kept)
     for _ in range(_MAX_ROUNDS):
         surface = Surface(points, faces)
-        flips = possible_flips(surface, np.unique(surface.face_edges[active]))
+        edges = np.unique(surface.face_edges[active])
+        edges = edges[~np.isin(edge_keys(surface.edges[edges]), keys)]
+        flips = possible_flips(surface, edges)
         before, after = (
             anisotropic_quality(points, triangles.reshape(-1, 3), roots).reshape(-1, 2).sum(axis=1)
             for triangles in (faces[flips.pair], flips.triangles)
@@ -130,8 +138,3 @@ def _keeps_surface(surface: Surface, flips: Flips, reference: ClosestPoints) -> 
     facing = reference.clearly_facing(points[some.triangles.reshape(-1, 3)]).reshape(-1, 2).all(axis=1)
     allowed[allowed] = (new_distance <= old_distance + _SLACK * length) & facing
     return allowed
-
-
-def _edge_keys(ends: npt.NDArray[np.integer], n_points: int) -> Ints:
-    low, high = np.sort(ends, axis=1).astype(np.int64).T
-    return np.asarray(low * n_points + high)

@@ -1,42 +1,85 @@
-"""Where the vertex of a cell on a crease or corner goes."""
+"""Where the vertices of the dual go in space."""
 
 from __future__ import annotations
 
 import numpy as np
 import numpy.typing as npt
 
-from anisomesh._arrays import Faces, Points
+from anisomesh._arrays import EdgeMask, EmbeddedPoints, Faces, Points
+from anisomesh.cvt.boundary import BoundaryArcs
 from anisomesh.cvt.diagram import Diagram
+from anisomesh.cvt.features import Features
 from anisomesh.cvt.voronoi import RestrictedVoronoi
+from anisomesh.dual.boundary import put_on_boundary
 from anisomesh.dual.cells import Cells
+from anisomesh.dual.creases import CreasedCells
 from anisomesh.surface import geometry
 from anisomesh.surface.closest import ClosestPoints
 from anisomesh.surface.features import corners
 from anisomesh.surface.mesh import Surface
 
 _SHARPNESS = 100.0
-_SNAP = 0.05  # mean edge lengths by which a point may move to be exactly on a corner or crease
-_FAR_SNAP = 0.45  # the same where the crease goes through the cell for a longer way,
-_TINY_SNAP = 1e-3  # the same where the creases in the cell are not straight
-_LONG = 0.05  # of so many mean edge lengths
-_SAME_PLANE = 1e-9  # by which the normals of facets in one plane may differ, and directions of one line
+_MOST_OFF = 0.1  # mean edge lengths by which the vertex may be off a curved crease
+_SAME_PLANE = 1e-9  # by which the normals of facets in one plane may differ,
 _MISSED = 0.05  # mean edge lengths between a corner and the mesh, from which on it counts as missed
 
 
-def creased_cells(
-    diagram: Diagram, cells: Cells, surface: Surface, sharp: npt.NDArray[np.bool_]
-) -> npt.NDArray[np.int64]:
-    """Return the cells (n,) that hold a piece of a sharp edge; ``surface`` has its faces in the diagram's order."""
-    return np.unique(cells.of_polygon[diagram.polygon_of[_on_creases(diagram, surface, sharp)[0]]]).astype(np.int64)
+def placed(
+    voronoi: RestrictedVoronoi,
+    diagram: Diagram,
+    cells: Cells,
+    surface: Surface,
+    features: Features,
+    rim: BoundaryArcs,
+    creased: CreasedCells,
+    points: EmbeddedPoints,
+    faces: Faces,
+    scale: float,
+) -> Points:
+    """Return the points of the dual in space (V, 3).
+
+    Parameters
+    ----------
+    voronoi, diagram, cells
+        The embedded surface, the diagram on it, and the components of its cells, which are the first points.
+    surface
+        The surface in space, its faces in the order of the diagram.
+    features, rim, creased
+        Boundary and creases, and what the cells have of them.
+    points, faces
+        The dual (V, d), (F, 3).
+    scale
+        The factor of the first three embedded coordinates.
+
+    Notes
+    -----
+    Vertices of cells that lie in one plane are put in it; those at boundary and creases on these; at a curved crease
+    a little outside, where its chords are nearest to it; those of other cells with a crease where their planes meet.
+    """
+    on_rim, fixed = put_on_boundary(points, rim, cells)
+    space = put_on_planes(diagram, cells, surface, points[:, :3] / scale)
+    sharp = cells_with_crease(diagram, cells, surface, features.sharp)
+    where = crease_positions(voronoi, diagram, cells, scale, sharp)
+    space[sharp] = where
+    space[fixed] = on_rim[fixed, :3] / scale
+    space[creased.cell] = creased.place[:, :3] / scale
+    bent = creased.bent & ~creased.corner
+    limit = _MOST_OFF * float(Surface(space, faces).edge_lengths.mean())
+    off = where[np.searchsorted(sharp, creased.cell[bent])] - space[creased.cell[bent]]
+    along = geometry.unit(creased.chord[bent, :3])
+    off -= np.einsum("nx,nx->n", off, along)[:, None] * along
+    size = np.linalg.norm(off, axis=1)
+    space[creased.cell[bent]] += np.where((size < limit)[:, None], off, 0.0)
+    fixed[creased.cell] = True
+    return snap_to_missed(diagram, cells, surface, space, faces, features.sharp, ~fixed[: len(cells.site)])
 
 
-def _on_creases(
-    diagram: Diagram, surface: Surface, sharp: npt.NDArray[np.bool_]
-) -> tuple[npt.NDArray[np.int64], npt.NDArray[np.int32]]:
-    """Return the edges of polygons (n,) that are on a sharp edge of the surface, and which that is (n,)."""
+def cells_with_crease(diagram: Diagram, cells: Cells, surface: Surface, sharp: EdgeMask) -> npt.NDArray[np.int64]:
+    """Return the cells (n,) that hold a piece of a sharp edge."""
     side = np.flatnonzero(diagram.label < 0)
-    edge = surface.face_edges[diagram.facet[diagram.polygon_of[side]], -1 - diagram.label[side]]
-    return side[sharp[edge]], edge[sharp[edge]]
+    polygon = diagram.polygon_of[side]
+    edge = surface.face_edges[diagram.facet[polygon], -1 - diagram.label[side]]
+    return np.unique(cells.of_polygon[polygon[sharp[edge]]]).astype(np.int64)
 
 
 def crease_positions(
@@ -73,55 +116,6 @@ def crease_positions(
     return np.asarray(np.linalg.solve(matrix, right[:, :, None])[:, :, 0])
 
 
-def put_on_creases(
-    diagram: Diagram, cells: Cells, surface: Surface, points: Points, faces: Faces, sharp: npt.NDArray[np.bool_]
-) -> Points:
-    """Return the points of the dual (V, 3), those near a crease or corner in their cell exactly on it.
-
-    Parameters
-    ----------
-    diagram, cells
-        The diagram and the components of its cells, which are the first points.
-    surface
-        The surface in space, its faces in the order of the diagram.
-    points, faces
-        The dual in space (V, 3), (F, 3).
-    sharp
-        Which edges of the surface (E,) are creases.
-
-    Notes
-    -----
-    A point no farther than a twentieth of an edge from a corner in its cell goes there, another to the closest point of
-    the creases in its cell, if these are straight and that is as near. Where a twentieth of an edge length of crease or
-    more between two planes is in the cell it may be farther: the neighbours on both sides along the crease are then too
-    far apart to be joined by an edge. On a curved crease points stay a little outside, where they are best for its
-    chords.
-    """
-    edge = float(Surface(points, faces).edge_lengths.mean())
-    side, crease = _on_creases(diagram, surface, sharp)
-    cell = cells.of_polygon[diagram.polygon_of[side]].astype(np.int64)
-    ends = [_in_space(diagram, surface, vertex) for vertex in (side, diagram.following[side])]
-    along = ends[1] - ends[0]
-    length = (along**2).sum(axis=1)
-    share = np.einsum("nx,nx->n", points[cell] - ends[0], along)
-    share = np.clip(np.divide(share, length, out=np.zeros_like(share), where=length > 0.0), 0.0, 1.0)
-    whole = surface.points[surface.edges[crease]]
-    direction = geometry.unit(whole[:, 1] - whole[:, 0])
-    names, first, place = np.unique(cell, return_index=True, return_inverse=True)
-    bent = np.abs(np.einsum("nx,nx->n", direction, direction[first][place])) < 1.0 - _SAME_PLANE
-    straight = np.zeros(len(points), dtype=bool)
-    straight[names] = np.bincount(place, bent) == 0
-    moved = np.array(points)
-    through = np.bincount(cell, np.sqrt(length), minlength=len(points)) > _LONG * 2.0 * edge  # from both facets
-    through[: len(cells.site)] &= _planes(diagram, cells, surface) <= 2
-    limit = edge * np.where(straight, np.where(through, _FAR_SNAP, _SNAP), _TINY_SNAP)
-    _move_to_nearest(moved, points, cell, ends[0] + share[:, None] * along, limit)
-    owner = _owners(diagram, cells, surface)
-    corner = np.flatnonzero(corners(surface, sharp) & (owner >= 0))
-    _move_to_nearest(moved, points, owner[corner], surface.points[corner], np.full(len(points), _SNAP * edge))
-    return moved
-
-
 def put_on_planes(diagram: Diagram, cells: Cells, surface: Surface, points: Points) -> Points:
     """Return the points of the dual (V, 3), those of cells that lie in one plane exactly in it."""
     first = np.unique(cells.of_polygon, return_index=True)[1]
@@ -145,22 +139,6 @@ def _planes(diagram: Diagram, cells: Cells, surface: Surface) -> npt.NDArray[np.
     size = len(cells.site)
     more = [np.bincount(cell, off > _SAME_PLANE, minlength=size) > 0 for off in (off_first, off_both)]
     return 1 + more[0].astype(np.int64) + more[1]
-
-
-def _in_space(diagram: Diagram, surface: Surface, vertex: npt.NDArray[np.integer]) -> Points:
-    """Return where vertices of the diagram (n,) are on the surface in space (n, 3)."""
-    corner = surface.points[surface.faces[diagram.facet[diagram.polygon_of[vertex]]]]
-    return np.asarray(np.einsum("nc,ncx->nx", diagram.barycentric[vertex], corner))
-
-
-def _move_to_nearest(
-    moved: Points, points: Points, cell: npt.NDArray[np.int64], places: Points, limit: npt.NDArray[np.float64]
-) -> None:
-    """Move the point of each cell named (n,) to the nearest of its places (n, 3) that is within its limit (V,)."""
-    distance = np.linalg.norm(places - points[cell], axis=1)
-    order = np.argsort(-distance, kind="stable")
-    order = order[distance[order] <= limit[cell[order]]]
-    moved[cell[order]] = places[order]  # of several the last, the nearest, stays
 
 
 def _owners(diagram: Diagram, cells: Cells, surface: Surface) -> npt.NDArray[np.int64]:

@@ -7,15 +7,19 @@ from dataclasses import dataclass
 import numpy as np
 
 from anisomesh._arrays import Faces, PointMask, Points, PointTensors, Sites
-from anisomesh.cvt.arcs import Arcs, Boundary
+from anisomesh.clock import Stop, never
+from anisomesh.cvt.boundary import BoundaryArcs
 from anisomesh.cvt.diagram import Diagram
+from anisomesh.cvt.features import Features
 from anisomesh.cvt.voronoi import RestrictedVoronoi
-from anisomesh.dual.boundary import points_on_boundary, put_on_boundary
+from anisomesh.dual.boundary import points_on_boundary
 from anisomesh.dual.cells import Cells, cells_of
-from anisomesh.dual.decimate import decimate
+from anisomesh.dual.creases import CreasedCells, creased_cells, join_along_creases
+from anisomesh.dual.decimate import Links, decimate
 from anisomesh.dual.flip import flip_for_shape
+from anisomesh.dual.grow import grow
 from anisomesh.dual.insert import points_in_cells, points_in_components
-from anisomesh.dual.place import crease_positions, creased_cells, put_on_creases, put_on_planes, snap_to_missed
+from anisomesh.dual.place import placed
 from anisomesh.dual.separate import separate
 from anisomesh.dual.simplicial import simplicial_mesh
 from anisomesh.dual.triangulate import dual_mesh
@@ -23,13 +27,15 @@ from anisomesh.dual.untangle import untangle
 from anisomesh.evaluation.quality import transfer_metric_roots
 from anisomesh.metric.tensor import metric_root
 from anisomesh.surface.closest import ClosestPoints
-from anisomesh.surface.features import sharp_edges
 from anisomesh.surface.mesh import Surface
+from anisomesh.surface.topology import edge_keys, half_edges
 
 MAX_ROUNDS = 10
 _MAX_TRIMS = 3
 _TRIM_TRIES = 50
 MAX_SHARE = 0.25  # of cells that are no disks; with more the sites are too few for this surface
+MAX_CREASE_SHARE = 0.5  # of the vertices asked for: sites added on creases
+MAX_KEPT = 0.5  # of the vertices asked for: corners that collapses leave alone
 MAX_GROWTH, MAX_MORE = 4, 1_000  # the most sites are so many times the vertices asked for, and so many more
 
 
@@ -65,12 +71,12 @@ def refine(
     sites: Sites,
     surface: Surface,
     plain: Surface,
-    boundary: Boundary,
+    features: Features,
     scale: float,
     *,
     n_vertices: int,
-    crease_angle: float,
     tensors: PointTensors,
+    stop: Stop = never,
 ) -> Refined:
     """Return the dual of the diagram of these sites, made valid, with at most so many vertices where possible.
 
@@ -84,17 +90,16 @@ def refine(
         The surface in space, its faces in the order of ``voronoi``.
     plain
         Another mesh of the same surface, to be coarsened if all else fails.
-    boundary
-        The boundary of the surface.
+    features
+        Boundary and creases of the surface.
     scale
         The factor of the first three embedded coordinates.
     n_vertices
         Vertices asked for.
-    crease_angle
-        Edges of the surface whose faces differ by more than this many degrees are creases, onto which the vertices of
-        their cells are put.
     tensors
         The metric at the points of the surface (V, 3, 3).
+    stop
+        Asked now and then whether to mend no more.
 
     Notes
     -----
@@ -106,7 +111,7 @@ def refine(
        that occur twice make it a simplicial mesh.
     3. What this inserted is taken away by edge collapses with the link condition, cheapest first.
     4. Triangles that face away from the surface are turned back by edge flips and moves.
-    5. Edges are flipped where that gives better triangles in the metric.
+    5. Edges are flipped where that gives better triangles in the metric, and the longest split if points are missing.
     6. Triangles that intersect where the surface does not are taken apart; points that this takes are made up for by
        collapses elsewhere.
 
@@ -115,22 +120,28 @@ def refine(
     that makes new defects as it mends old ones.
     """
     n_start = len(sites)
-    diagram, cells, arcs, complete = _with_enough_sites(voronoi, sites, surface, boundary, n_vertices)
+    diagram, cells, arcs, creased, complete = _with_enough_sites(voronoi, sites, surface, features, n_vertices)
+    reference = ClosestPoints(surface)
+    links, kept = np.zeros((0, 2), dtype=np.int64), np.zeros(len(plain.points), dtype=bool)
     if complete:
         points, faces, _ = simplicial_mesh(dual_mesh(diagram, cells, surface))
-        points, rim = put_on_boundary(points, arcs, cells)
-        space = _placed(voronoi, diagram, cells, surface, points[:, :3] / scale, faces, rim, scale, crease_angle)
+        space = placed(voronoi, diagram, cells, surface, features, arcs, creased, points, faces, scale)
+        faces = join_along_creases(space, faces, creased.bridges, reference)
+        links = creased.links[np.isin(edge_keys(creased.links), edge_keys(half_edges(faces)))]
+        kept = np.zeros(len(space), dtype=bool)
+        kept[creased.cell[creased.corner][: int(MAX_KEPT * n_vertices)]] = True
     else:
         space, faces = plain.points, plain.faces
     n_first = len(space)
-    reference = ClosestPoints(surface)
-    space, faces, _ = untangle(space, faces, reference)
+    space, faces, links, kept = _untangled(space, faces, links, kept, reference, stop)
     if len(space) > n_vertices:
-        space, faces = decimate(space, faces, n_vertices, reference)
-        space, faces, _ = untangle(space, faces, reference)
+        space, faces, links = decimate(space, faces, n_vertices, reference, kept=kept, creases=links)
+        space, faces, links, _ = _untangled(space, faces, links, np.zeros(len(space), dtype=bool), reference, stop)
     roots = transfer_metric_roots(reference, metric_root(tensors), space)
-    faces = flip_for_shape(space, faces, roots, reference)
-    space, faces = _without_crossings(space, faces, n_vertices, reference)
+    faces = flip_for_shape(space, faces, roots, reference, kept=links)
+    if len(space) < n_vertices:
+        space, faces = grow(space, faces, n_vertices, reference, roots)
+    space, faces = _without_crossings(space, faces, links, n_vertices, reference, stop)
     return Refined(
         points=space,
         faces=faces,
@@ -143,59 +154,61 @@ def refine(
 
 
 def _with_enough_sites(
-    voronoi: RestrictedVoronoi, sites: Sites, surface: Surface, boundary: Boundary, n_vertices: int
-) -> tuple[Diagram, Cells, Arcs, bool]:
-    """Return diagram, cells and arcs with sites added until none is missing, and whether that was reached."""
+    voronoi: RestrictedVoronoi, sites: Sites, surface: Surface, features: Features, n_vertices: int
+) -> tuple[Diagram, Cells, BoundaryArcs, CreasedCells, bool]:
+    """Return diagram, cells, arcs and creased cells with sites added until none is missing, and whether none is."""
     most = MAX_GROWTH * n_vertices + MAX_MORE
+    room = int(MAX_CREASE_SHARE * n_vertices)
     for _ in range(MAX_ROUNDS):
         diagram = voronoi.diagram(sites)
         cells = cells_of(diagram, surface.face_neighbours, voronoi.facets.area)
         bad = cells.euler != 1
-        arcs = boundary.arcs(diagram)
+        arcs = features.boundary.arcs(diagram)
+        creased = creased_cells(features.creases, features.creases.arcs(diagram), arcs, cells, sites)
         missing = np.concatenate(
             [
                 points_in_cells(diagram, cells, bad),
                 points_in_components(diagram, cells, surface),
-                points_on_boundary(arcs, boundary.curves, cells, sites),
+                points_on_boundary(arcs, features.boundary.curves, cells, sites),
             ]
         )
-        if len(missing) == 0 or bad.mean() > MAX_SHARE or len(sites) + len(missing) > most:
+        complete = len(missing) == 0
+        on_creases = creased.missing[:room]
+        if len(missing) + len(on_creases) == 0 or bad.mean() > MAX_SHARE or len(sites) + len(missing) > most:
             break
-        sites = np.concatenate([sites, missing])
-    return diagram, cells, arcs, len(missing) == 0
+        room -= len(on_creases)
+        sites = np.concatenate([sites, missing, on_creases])
+    return diagram, cells, arcs, creased, complete
 
 
-def _placed(
-    voronoi: RestrictedVoronoi,
-    diagram: Diagram,
-    cells: Cells,
-    surface: Surface,
-    points: Points,
-    faces: Faces,
-    on_boundary: PointMask,
-    scale: float,
-    crease_angle: float,
-) -> Points:
-    """Return the points of the dual in space (V, 3), those within the boundary on planes, creases and corners."""
-    sharp = sharp_edges(surface, crease_angle)
-    placed = put_on_planes(diagram, cells, surface, points)
-    creased = creased_cells(diagram, cells, surface, sharp)
-    placed[creased] = crease_positions(voronoi, diagram, cells, scale, creased)
-    placed = put_on_creases(diagram, cells, surface, placed, faces, sharp)
-    placed[on_boundary] = points[on_boundary]
-    return snap_to_missed(diagram, cells, surface, placed, faces, sharp, ~on_boundary[: len(cells.site)])
+def _untangled(
+    points: Points, faces: Faces, links: Links, kept: PointMask, reference: ClosestPoints, stop: Stop
+) -> tuple[Points, Faces, Links, PointMask]:
+    """Return the mesh with turned triangles mended, and the links and points to be kept that have not moved."""
+    after, faces, _ = untangle(points, faces, reference, stop=stop)
+    if after is points:
+        return points, faces, links, kept
+    places = {point.tobytes(): number for number, point in enumerate(after)}
+    number = np.array([places.get(point.tobytes(), -1) for point in points], dtype=np.int64)
+    links, still = number[links], np.zeros(len(after), dtype=bool)
+    still[number[kept & (number >= 0)]] = True
+    return after, faces, links[(links >= 0).all(axis=1)], still
 
 
-def _without_crossings(points: Points, faces: Faces, n_vertices: int, reference: ClosestPoints) -> tuple[Points, Faces]:
+def _without_crossings(
+    points: Points, faces: Faces, links: Links, n_vertices: int, reference: ClosestPoints, stop: Stop
+) -> tuple[Points, Faces]:
     """Return the mesh with intersecting triangles taken apart, and back at no more points than before if possible."""
     n_wanted = max(n_vertices, len(points))
-    points, faces, crossing = separate(points, faces, reference)
+    points, faces, crossing = separate(points, faces, reference, stop=stop)
     for _ in range(_MAX_TRIMS):
         if len(points) <= n_wanted:
             break
         kept = np.arange(len(points)) >= n_wanted
-        coarser = separate(*decimate(points, faces, n_wanted, reference, kept=kept), reference, max_tries=_TRIM_TRIES)
+        points_left, faces_left, links_left = decimate(points, faces, n_wanted, reference, kept=kept, creases=links)
+        coarser = separate(points_left, faces_left, reference, max_tries=_TRIM_TRIES, stop=stop)
         if coarser[2] > crossing:
             break
         points, faces, crossing = coarser
+        links = links_left
     return points, faces

@@ -9,6 +9,7 @@ import numpy as np
 import numpy.typing as npt
 
 from anisomesh._arrays import Faces, Points
+from anisomesh.clock import Stop, never
 from anisomesh.dual.flip import possible_flips
 from anisomesh.dual.moves import faces_around
 from anisomesh.evaluation.validity import crossing_facets, new_intersections
@@ -43,11 +44,12 @@ class _Tries:
     """How many more pairs may be looked at, and the pieces of meshes on which nothing helped."""
 
     left: int
+    stop: Stop
     failed: set[bytes] = field(default_factory=set)
 
 
 def separate(
-    points: Points, faces: Faces, reference: ClosestPoints, *, max_tries: int = 300
+    points: Points, faces: Faces, reference: ClosestPoints, *, max_tries: int = 300, stop: Stop = never
 ) -> tuple[Points, Faces, int]:
     """Mend pairs of triangles that intersect, where the reference does not, without changing the topology.
 
@@ -59,6 +61,8 @@ def separate(
         The surface that it stands for.
     max_tries
         Pairs that are looked at, in all rounds together; one amid many faces counts for several.
+    stop
+        Asked before every pair whether to end.
 
     Returns
     -------
@@ -78,7 +82,7 @@ def separate(
     crossing = crossing_facets(reference.surface)
     best = points, faces, len(faces) ** 2
     splits = 0
-    tries = _Tries(max_tries)
+    tries = _Tries(max_tries, stop)
     for _ in range(MAX_ROUNDS):
         surface = Surface(points, faces)
         pairs = new_intersections(surface, crossing).astype(np.int64)
@@ -103,7 +107,7 @@ def _changes(
     corners = surface.points[surface.faces]
     boxes = corners.min(axis=1), corners.max(axis=1)
     for pair in pairs:
-        if tries.left <= 0:
+        if tries.left <= 0 or tries.stop():
             break
         zone = _zone(surface, pair, boxes)
         if busy[zone].any():

@@ -8,6 +8,7 @@ import numpy as np
 import numpy.typing as npt
 
 from anisomesh._arrays import FaceMask, Faces, Points
+from anisomesh.clock import Stop, never
 from anisomesh.dual.decimate import collapsible_edges
 from anisomesh.dual.flip import do_flips, possible_flips
 from anisomesh.dual.moves import Failed, Mended, faces_around, nudge, relax, to_average, wander
@@ -20,7 +21,9 @@ _MAX_WANDERS = 40
 _LIFTS = (0.0, 0.1, 0.25, 0.5, 1.0)  # trial heights over an edge, in edge lengths
 
 
-def untangle(points: Points, faces: Faces, reference: ClosestPoints) -> tuple[Points, Faces, int]:
+def untangle(
+    points: Points, faces: Faces, reference: ClosestPoints, *, stop: Stop = never
+) -> tuple[Points, Faces, int]:
     """Mend triangles that face away from the reference, without changing the topology.
 
     Parameters
@@ -29,6 +32,8 @@ def untangle(points: Points, faces: Faces, reference: ClosestPoints) -> tuple[Po
         An oriented manifold mesh (V, 3), (F, 3).
     reference
         The surface that it stands for.
+    stop
+        Asked before every round whether to end.
 
     Returns
     -------
@@ -55,7 +60,7 @@ def untangle(points: Points, faces: Faces, reference: ClosestPoints) -> tuple[Po
         left = int(turned.sum())
         if left < best[2]:
             best = points, faces, left
-        if left == 0:
+        if left == 0 or stop():
             break
         for mend in (_flip, to_average, nudge, _collapse, _split, relax):
             mended: Mended = mend(surface, turned, reference, failed)

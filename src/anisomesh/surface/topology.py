@@ -15,11 +15,15 @@ def half_edges(faces: Faces) -> npt.NDArray[np.int32]:
     return faces[:, [[1, 2], [2, 0], [0, 1]]].reshape(-1, 2)
 
 
+def edge_keys(ends: npt.NDArray[np.integer]) -> npt.NDArray[np.int64]:
+    """Return a number for each edge (n,), the same for both orders of its ends (n, 2)."""
+    low, high = np.sort(ends, axis=1).astype(np.int64).T
+    return np.asarray(low << 32 | high)
+
+
 def edges_of(faces: Faces) -> tuple[Edges, FaceIndices]:
     """Return the unique edges (E, 2), lower index first, and the edge opposite each corner (F, 3)."""
-    sides = np.sort(half_edges(faces), axis=1).astype(np.int64)
-    keys = sides[:, 0] << 32 | sides[:, 1]
-    unique, inverse = np.unique(keys, return_inverse=True)
+    unique, inverse = np.unique(edge_keys(half_edges(faces)), return_inverse=True)
     edges = np.stack([unique >> 32, unique & 0xFFFFFFFF], axis=1).astype(np.int32)
     return edges, inverse.reshape(-1, 3).astype(np.int32)
 

@@ -1,0 +1,135 @@
+"""The smallest number of vertices that keeps a remesh within a distance of the surface."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import replace
+from math import exp, log
+
+from anisomesh.clock import Clock
+from anisomesh.errors import OptionError
+from anisomesh.evaluation.distance import surface_distance
+from anisomesh.result import RemeshResult
+from anisomesh.surface.mesh import Surface
+
+MIN_VERTICES = 4
+MAX_RUNS = 16
+CLOSE = 1.03  # the search ends when a count this much smaller is known not to do
+FIRST_RATIO = 0.1  # of the vertices of the surface, for the first run
+MOST_RATIO, MOST_MORE = 4, 1_000  # so many times the vertices of the surface, and so many more, is the largest count
+SAMPLES = 50_000  # points on each surface that distances are taken from, besides vertices and middles of edges
+
+
+def smallest_within(
+    remesh: Callable[[int], RemeshResult], surface: Surface, max_error: float, clock: Clock
+) -> RemeshResult:
+    """Return the smallest remesh found whose distance from the surface, both ways, is at most ``max_error``.
+
+    Parameters
+    ----------
+    remesh
+        Returns the result for a number of vertices.
+    surface
+        The surface that is remeshed.
+    max_error
+        Largest distance, in its units.
+    clock
+        The search ends when its limit is over, if there is a result that does.
+
+    Raises
+    ------
+    OptionError
+        If not even four times as many vertices as the surface has do.
+    """
+    results: dict[int, RemeshResult] = {}
+
+    def error_at(n: int) -> float:
+        result = remesh(n)
+        error = surface_distance(surface, result.surface, SAMPLES).hausdorff
+        if error <= max_error:
+            results.clear()
+            results[n] = replace(result, distance=error)  # of the results only the last that does is kept
+        return error
+
+    most = MOST_RATIO * surface.n_points + MOST_MORE
+    first = max(MIN_VERTICES, round(FIRST_RATIO * surface.n_points))
+    n, error = smallest_count(error_at, max_error, first, MIN_VERTICES, most, stop=clock.over)
+    if n not in results:
+        raise OptionError(
+            f"max_error = {max_error:g} is not reached: with {n:,} vertices the distance is {error:g}; allow more"
+        )
+    return results[n]
+
+
+def smallest_count(
+    error_at: Callable[[int], float],
+    max_error: float,
+    first: int,
+    least: int,
+    most: int,
+    *,
+    stop: Callable[[], bool] = lambda: False,
+) -> tuple[int, float]:
+    """Return the smallest count found with an error of at most ``max_error``, and that error.
+
+    Parameters
+    ----------
+    error_at
+        The error for a count; it falls as the count grows, about as a power of it, but not at every step.
+    max_error
+        The error allowed.
+    first, least, most
+        The first count tried, the smallest, and the largest.
+    stop
+        Whether to end with what there is, asked once some count is known to do.
+
+    Returns
+    -------
+    n, error
+        A count that does, unless ``most`` (or the last count tried) has a larger error.
+
+    Notes
+    -----
+    Counts that do not do and counts that do close in on the answer, by the secant through both in logarithms, with
+    steps to both sides of it so that both ends move. It ends when they are within 3 % of each other.
+    """
+    n = min(max(first, least), most)
+    error = error_at(n)
+    low: tuple[int, float] | None = None
+    high: tuple[int, float] | None = None
+    for _ in range(MAX_RUNS):
+        if error <= max_error:
+            high = n, error
+        else:
+            low = n, error
+        if high is not None and (high[0] == least or stop()):
+            break
+        if low is not None and (low[0] == most or (high is not None and _close(low[0], high[0]))):
+            break
+        n = _next(low, high, max_error, least, most)
+        error = error_at(n)
+    else:
+        if error <= max_error:
+            high = n, error
+    return high or (n, error)
+
+
+def _close(low: int, high: int) -> bool:
+    return high <= low + 1 or high <= CLOSE * low
+
+
+def _next(
+    low: tuple[int, float] | None, high: tuple[int, float] | None, max_error: float, least: int, most: int
+) -> int:
+    """Return the count to try next: beyond the end that is known, or between both."""
+    if low is None or high is None:
+        n, error = low or high or (least, max_error)
+        factor = min(max(error / max_error, 1e-3), 1e3)  # the error of a smooth surface is about as 1 / count
+        factor = min(max(factor, 1.3), 4.0) if low is not None else min(max(factor, 0.25), 1 / 1.3)
+        return min(max(round(factor * n), least), most)
+    width = log(high[0] / low[0])
+    drop = log(max(low[1], 1e-300) / max(high[1], 1e-300))
+    share = log(low[1] / max_error) / drop if drop > 0.0 else 0.5
+    share = min(max(share, 0.15), 0.85)
+    n = round(exp(log(low[0]) + share * width))
+    return min(max(n, low[0] + 1), high[0] - 1)
