@@ -68,9 +68,7 @@ def main() -> int:
         for name in names:
             if name.startswith(f"{options.folder}/"):
                 inputs[Path(name).name.split("--")[0]] = anisomesh.load(data / name)
-    print(
-        "| part | vertices before | after | creases / mean edge | covered | corners exact | G | largest distance | warnings |"
-    )
+    print("| part | vertices before | after | creases / edge | covered | corners exact | G | distance | warnings |")
     print("|---|---|---|---|---|---|---|---|---|")
     missed = 0
     for name, surface in inputs.items():

@@ -95,7 +95,7 @@ def _triangulated(outline: Outline) -> npt.NDArray[np.int64]:
     """
     left = list(range(len(outline)))
     triangles = []
-    while len(left) > 3:
+    while len(left) >= 3:
         for k in range(len(left)):
             a, b, c = left[k - 1], left[k], left[(k + 1) % len(left)]
             others = outline[[point for point in left if point not in (a, b, c)]]
@@ -106,7 +106,7 @@ def _triangulated(outline: Outline) -> npt.NDArray[np.int64]:
                 break
         else:
             raise OptionError("the outline is no simple polygon with its corners counter-clockwise")
-    return np.array([*triangles, left], dtype=np.int64)
+    return np.array(triangles, dtype=np.int64)
 
 
 def _side(a: Outline, b: Outline, point: Outline) -> Outline:

@@ -1,0 +1,58 @@
+"""The search for the smallest count, on errors given by formulas, with and without noise."""
+
+import numpy as np
+import pytest
+
+from anisomesh.search import CLOSE, smallest_count
+
+
+def counted(function):
+    tried = []
+
+    def error_at(n):
+        tried.append(n)
+        return function(n)
+
+    return error_at, tried
+
+
+@pytest.mark.parametrize("power", [0.5, 1.0, 2.0])
+@pytest.mark.parametrize("answer", [4, 5, 37, 1_000, 99_000])
+@pytest.mark.parametrize("first", [4, 300, 100_000])
+def test_the_smallest_count_is_found_to_three_per_cent(power, answer, first):
+    error_at, tried = counted(lambda n: (answer / n) ** power)
+    n, error = smallest_count(error_at, 1.0, first, 4, 100_000)
+    assert error == error_at(n) <= 1.0
+    assert answer <= n <= max(answer + 1, CLOSE * answer)
+    assert len(tried) <= 17
+
+
+@pytest.mark.parametrize("seed", range(20))
+def test_an_error_that_jumps_still_gives_a_count_that_does(seed):
+    rng = np.random.default_rng(seed)
+    noise = rng.uniform(0.8, 1.25, 10_001)
+    error_at, tried = counted(lambda n: 500 / n * noise[n])
+    n, error = smallest_count(error_at, 1.0, 100, 4, 10_000)
+    assert error == 500 / n * noise[n] <= 1.0
+    assert 400 <= n <= 640
+    assert len(set(tried)) == len(tried) <= 17
+
+
+def test_an_error_out_of_reach_is_told_by_the_largest_count():
+    error_at, tried = counted(lambda n: 2.0)
+    assert smallest_count(error_at, 1.0, 100, 4, 5_000) == (5_000, 2.0)
+    assert max(tried) == 5_000
+
+
+def test_the_smallest_allowed_count_is_returned_where_it_does():
+    error_at, tried = counted(lambda n: 0.0)
+    assert smallest_count(error_at, 1.0, 100, 4, 5_000) == (4, 0.0)
+    assert len(tried) < 10
+
+
+def test_it_ends_when_told_but_not_without_a_count_that_does():
+    error_at, tried = counted(lambda n: 1000 / n)
+    n, error = smallest_count(error_at, 1.0, 100, 4, 5_000, stop=lambda: True)
+    assert error <= 1.0
+    assert n == tried[-1]
+    assert tried[:-1] == [n for n in tried if n < 1000]

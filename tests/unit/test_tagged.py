@@ -1,0 +1,108 @@
+"""Edges named by the user: found again after repair and on the split surface, wrong ones refused."""
+
+import numpy as np
+import pytest
+
+from anisomesh.errors import MeshFileError, OptionError
+from anisomesh.surface.mesh import Surface
+from anisomesh.surface.prepare import prepare
+from anisomesh.surface.shapes import box, open_patch
+from anisomesh.surface.subdivide import split_long_edges
+from anisomesh.surface.tagged import edges_within, load_pairs, tagged_edges
+
+
+def grid(n=4):
+    return open_patch(lambda x, y: 0.0 * x, n=n)
+
+
+def row(surface, y=0.0):
+    """Return the edges of a grid along a line of constant y, as pairs of points."""
+    on = np.flatnonzero(np.abs(surface.points[:, 1] - y) < 1e-9)
+    on = on[np.argsort(surface.points[on, 0])]
+    return np.stack([on[:-1], on[1:]], axis=1)
+
+
+def ends_of(surface, mask):
+    """Return the places of both ends of the marked edges, each row sorted."""
+    ends = surface.points[surface.edges[mask]].round(9)
+    return sorted(sorted(map(tuple, pair)) for pair in ends.tolist())
+
+
+def test_edges_are_found_in_either_order_of_their_ends():
+    surface = grid()
+    pairs = row(surface)
+    for named in (pairs, pairs[:, ::-1], pairs[::-1]):
+        found = tagged_edges(surface, named, surface, 0.0)
+        assert sorted(map(tuple, np.sort(pairs, axis=1))) == sorted(map(tuple, surface.edges[found]))
+
+
+def test_edges_are_found_again_in_a_soup_that_was_welded_and_renumbered():
+    surface = grid()
+    soup = Surface(surface.points[surface.faces[::-1].ravel()], np.arange(3 * surface.n_faces).reshape(-1, 3))
+    wanted = tagged_edges(surface, row(surface), surface, 0.0)
+    corners = soup.points[soup.edges]
+    along = np.flatnonzero((np.abs(corners[:, :, 1]) < 1e-9).all(axis=1))
+    prepared = prepare(soup).surface
+    assert prepared.n_points == surface.n_points
+    found = tagged_edges(soup, soup.edges[along], prepared, 0.0)
+    assert ends_of(prepared, found) == ends_of(surface, wanted)
+
+
+@pytest.mark.parametrize("length", [10.0, 0.4, 0.11])
+def test_pieces_of_a_split_edge_are_those_that_lie_in_it(length):
+    part = box((2.0, 1.0, 0.3), n=2)
+    rng = np.random.default_rng(0)
+    tagged = rng.random(len(part.edges)) < 0.2
+    refined = split_long_edges(part, length, max_faces=100_000)
+    pieces = edges_within(refined, part, tagged)
+    fine = refined.surface
+    a, b = (part.points[part.edges[tagged][:, k]] for k in (0, 1))
+    way = b - a
+    for place in (0, 1):
+        ends = fine.points[fine.edges[pieces][:, place]]
+        share = np.clip(np.einsum("nex,ex->ne", ends[:, None] - a, way) / (way**2).sum(axis=1), 0.0, 1.0)
+        off = np.linalg.norm(a + share[:, :, None] * way - ends[:, None], axis=2)
+        assert off.min(axis=1).max() < 1e-12
+    assert fine.edge_lengths[pieces].sum() == pytest.approx(part.edge_lengths[tagged].sum())
+
+
+@pytest.mark.parametrize(
+    ("pairs", "words"),
+    [
+        ([[0, 1, 2]], r"expected \(n, 2\)"),
+        ([0, 1], r"expected \(n, 2\)"),
+        ([["a", "b"]], r"expected \(n, 2\)"),
+        ([[0, 25]], "0 to 24"),
+        ([[-1, 0]], "0 to 24"),
+        ([[0.5, 1.0]], "whole numbers"),
+        ([[0, 1], [0, 24]], "1 of the 2 pairs"),
+        ([[3, 3]], "no edges"),
+    ],
+)
+def test_pairs_that_are_no_edges_are_refused(pairs, words):
+    surface = grid()
+    with pytest.raises(OptionError, match=words):
+        tagged_edges(surface, pairs, surface, 0.0)
+
+
+def test_no_pairs_mark_nothing():
+    surface = grid()
+    assert not tagged_edges(surface, np.zeros((0, 2)), surface, 0.0).any()
+
+
+def test_a_file_of_pairs_may_have_remarks_and_empty_lines(tmp_path):
+    path = tmp_path / "edges.txt"
+    path.write_text("# edges\n0 1\n\n  2\t3  # a remark\n")
+    assert load_pairs(path).tolist() == [[0, 1], [2, 3]]
+    path.write_text("")
+    assert load_pairs(path).shape == (0, 2)
+
+
+@pytest.mark.parametrize("text", ["0 1 2\n", "0\n", "a b\n", "0 1.5\n", "-1 2\n", "0 " + "9" * 30, "\xff\xfe"])
+def test_other_files_are_refused_with_the_line(tmp_path, text):
+    path = tmp_path / "edges.txt"
+    path.write_bytes(b"0 1\n" + text.encode("latin-1"))
+    with pytest.raises(MeshFileError, match=r"edges.txt(, line 2|: cannot)"):
+        load_pairs(path)
+    with pytest.raises(MeshFileError, match="cannot be read"):
+        load_pairs(tmp_path / "none.txt")
