@@ -1,0 +1,175 @@
+"""What is asked for is what comes: the exact count, the largest error, the edges named, the time limit."""
+
+import json
+
+import numpy as np
+import pytest
+from edge_distance import distance_to_edges
+
+import anisomesh
+from anisomesh.errors import AnisomeshError, OptionError, TimeLimitError
+from anisomesh.evaluation.distance import surface_distance
+from anisomesh.surface import topology
+from anisomesh.surface.features import points_along
+from anisomesh.surface.mesh import Surface
+from anisomesh.surface.shapes import cad_features, cad_part, cylinder, ellipsoid, open_patch, sphere, torus
+
+COUNTS = {
+    "sphere": (lambda: sphere(3), (4, 5, 17, 150, 900)),
+    "torus": (lambda: torus(n_major=48, n_minor=24), (40, 333, 2000)),
+    "part": (lambda: cad_part(8), (60, 201, 800)),
+    "open": (lambda: open_patch(lambda x, y: 0.3 * x * y, n=12), (9, 50, 400)),
+    "two": (lambda: joined(sphere(2), sphere(1).with_points(sphere(1).points + 3.0)), (12, 100)),
+}
+
+
+def joined(a, b):
+    return Surface(np.concatenate([a.points, b.points]), np.concatenate([a.faces, b.faces + a.n_points]))
+
+
+@pytest.mark.parametrize(("name", "n"), [(name, n) for name, (_, counts) in COUNTS.items() for n in counts])
+def test_the_count_is_exact(name, n):
+    result = anisomesh.remesh(COUNTS[name][0](), n_vertices=n, max_iterations=15)
+    assert result.surface.n_points == n
+    assert result.validity.euler == result.validity.euler_input
+    assert not result.warnings
+
+
+def test_sites_at_the_same_place_are_made_up_for():
+    """Regression: sites that coincide have no cell of their own, and the result had fewer vertices than asked."""
+    surface = Surface([[0, 0, 0], [1, 0, 0], [1, 1, 0], [0, 1, 0]], [[0, 1, 2], [0, 2, 3]])
+    for n in (4, 5, 6, 7, 30):
+        assert anisomesh.remesh(surface, n_vertices=n, max_iterations=10).surface.n_points == n
+
+
+@pytest.mark.parametrize("share", [0.01, 0.002])
+@pytest.mark.parametrize("shape", [ellipsoid((2.0, 1.0, 0.5), 4), cad_part(8)], ids=["ellipsoid", "part"])
+def test_a_result_is_within_the_error_asked_for(shape, share):
+    asked = share * shape.diagonal
+    result = anisomesh.remesh(shape, max_error=asked, max_iterations=20)
+    measured = surface_distance(shape, result.surface, 30_000, seed=5).hausdorff
+    assert measured < 1.02 * asked
+    assert result.distance <= asked
+    assert result.distance == pytest.approx(measured, rel=0.1)
+    fewer = anisomesh.remesh(shape, n_vertices=int(0.6 * result.surface.n_points), max_iterations=20)
+    assert surface_distance(shape, fewer.surface, 30_000).hausdorff > asked
+
+
+def test_an_error_out_of_reach_is_refused():
+    rough = sphere(1)
+    with pytest.raises(OptionError, match=r"max_error = 1e-09 is not reached: with 1,168 vertices"):
+        anisomesh.remesh(rough.with_points(rough.points * [1.0, 1.0, 0.7]), max_error=1e-9, max_iterations=2)
+
+
+@pytest.mark.parametrize("wrong", [0.0, -1.0, float("nan"), float("inf")])
+def test_errors_that_are_no_lengths_are_refused(wrong):
+    with pytest.raises(OptionError, match="positive length"):
+        anisomesh.remesh(sphere(1), max_error=wrong)
+
+
+def helix(around=48, along=28):
+    """Return a cylinder and a line of edges that winds once around it, which no dihedral angle shows."""
+    surface = cylinder(0.5, 2.0, around, along, closed=False)
+    step = np.arange(along)
+    first = step * around + step % around
+    return surface, np.stack([first, first + around + 1], axis=1)
+
+
+@pytest.mark.parametrize("sharpness", [1.0, 7.0])
+def test_edges_named_are_edges_of_the_result(sharpness):
+    surface, pairs = helix()
+    known = {tuple(sorted(edge)) for edge in surface.edges.tolist()}
+    pairs = np.array([pair for pair in pairs.tolist() if tuple(sorted(pair)) in known])
+    assert len(pairs) == 28
+    result = anisomesh.remesh(surface, n_vertices=250, features=pairs, sharpness=sharpness)
+    new = result.surface
+    spaced = np.concatenate([surface.points[pairs].mean(axis=1), surface.points[pairs[:, 0]]])
+    without = anisomesh.remesh(surface, n_vertices=250, sharpness=sharpness).surface
+    reach = 0.1 * new.edge_lengths.mean()
+    assert (distance_to_edges(spaced, new) < reach).mean() > 0.97
+    near, far = distance_to_edges(spaced, new).mean(), distance_to_edges(spaced, without).mean()
+    assert near < 0.3 * far
+
+
+def test_a_line_on_a_plane_is_followed_exactly():
+    surface = open_patch(lambda x, y: 0.0 * x, n=10)
+    on = np.flatnonzero(np.abs(surface.points[:, 0] - surface.points[:, 1]) < 1e-9)
+    on = on[np.argsort(surface.points[on, 0])]
+    pairs = np.stack([on[:-1], on[1:]], axis=1)
+    new = anisomesh.remesh(surface, n_vertices=70, features=pairs).surface
+    along = np.linspace(-1.0, 1.0, 101)[:, None] * [1.0, 1.0, 0.0]
+    assert distance_to_edges(along, new).max() < 1e-9
+    assert new.n_points == 70
+
+
+def test_the_feature_angle_decides_what_a_crease_is():
+    part, features = cad_part(10), cad_features(10)  # with one weak crease, of 20 degrees
+    weak = topology.edge_keys(features.creases[features.weak])
+    along = points_along(part, np.isin(topology.edge_keys(part.edges), weak), 0.02)
+    reached = {}
+    for angle in (15.0, 40.0):
+        new = anisomesh.remesh(part, n_vertices=300, feature_angle=angle).surface
+        reached[angle] = (distance_to_edges(along, new) < 1e-9).mean()
+    assert reached[15.0] > 0.99
+    assert reached[40.0] < 0.5
+
+
+def test_the_command_reads_the_edges_and_says_what_is_wrong_with_them(run_cli, tmp_path):
+    surface, pairs = helix()
+    anisomesh.save(surface, tmp_path / "in.ply")
+    (tmp_path / "edges.txt").write_text("\n".join(f"{a} {b}" for a, b in pairs.tolist()))
+    words = ("remesh", "in.ply", "-o", "out.ply", "--features", "edges.txt", "--feature-angle", 50)
+    done = run_cli(*words, "-n", 250, "--json", cwd=tmp_path)
+    assert done.returncode == 0, done.stderr
+    report = json.loads(done.stdout)
+    assert report["vertices"] == 250
+    assert (report["options"]["features"], report["options"]["feature_angle"]) == ("edges.txt", 50.0)
+    (tmp_path / "edges.txt").write_text("0 900000\n")
+    done = run_cli(*words, "-n", 100, cwd=tmp_path)
+    assert done.returncode == 1
+    assert done.stderr.strip().splitlines()[-1].startswith("anisomesh: error: features names points")
+
+
+@pytest.mark.parametrize("text", ["0.02", "0.55%"])
+def test_the_command_searches_for_a_count(run_cli, tmp_path, torus_obj, text):
+    done = run_cli("remesh", torus_obj, "-o", tmp_path / "out.ply", "--max-error", text, "--json", "--quiet")
+    assert done.returncode == 0, done.stderr
+    report = json.loads(done.stdout)
+    result = anisomesh.load(tmp_path / "out.ply")
+    assert report["vertices"] == result.n_points
+    limit = 0.02 if text == "0.02" else 0.0055 * anisomesh.load(torus_obj).diagonal
+    assert 0.5 * limit < report["distance"] <= limit
+
+
+@pytest.mark.parametrize("text", ["0", "-1", "x", "%", "nan"])
+def test_lengths_that_are_none_are_refused(run_cli, tmp_path, torus_obj, text):
+    done = run_cli("remesh", torus_obj, "-o", tmp_path / "out.ply", f"--max-error={text}")
+    assert done.returncode == 2
+    assert len(done.stderr.strip().splitlines()) == 1
+
+
+def test_a_time_limit_ends_the_optimisation_and_says_so():
+    surface = torus(n_major=120, n_minor=60)
+    anisomesh.remesh(sphere(2), n_vertices=50)  # so that everything is compiled
+    limited = anisomesh.remesh(surface, n_vertices=5_000, time_limit=1.5, max_iterations=2_000)
+    assert limited.iterations < 2_000
+    assert "time limit" in limited.status.value
+    assert limited.warnings[0].startswith("the time limit of 1.5 s ended the optimisation")
+    assert limited.seconds["total"] < 10.0
+    assert limited.surface.n_points == 5_000
+    assert limited.validity.euler == 0
+
+
+def test_a_time_limit_that_leaves_nothing_is_an_error(run_cli, tmp_path, torus_obj):
+    with pytest.raises(TimeLimitError, match="before the optimisation began"):
+        anisomesh.remesh(torus(n_major=120, n_minor=60), n_vertices=5_000, time_limit=1e-3)
+    done = run_cli("remesh", torus_obj, "-o", tmp_path / "out.ply", "-n", 100, "--time-limit", 0.001)
+    assert done.returncode == 1
+    assert not (tmp_path / "out.ply").exists()
+    assert "time limit" in done.stderr.strip().splitlines()[-1]
+
+
+def test_one_of_the_ways_to_ask_is_wanted():
+    for asked in ({}, {"n_vertices": 9, "max_error": 0.1}, {"ratio": 0.1, "max_error": 0.1}):
+        with pytest.raises(AnisomeshError, match="one of n_vertices, ratio and max_error"):
+            anisomesh.remesh(sphere(1), **asked)

@@ -1,0 +1,37 @@
+"""The promise of a valid mesh, on random shapes that are hard to keep it for, and any number of vertices."""
+
+import hypothesis
+import numpy as np
+import pytest
+from hypothesis import strategies as st
+from random_shapes import SHAPES
+
+from anisomesh.pipeline import remesh
+from anisomesh.surface import topology
+from anisomesh.surface.prepare import prepare
+
+
+@pytest.mark.parametrize("make", SHAPES)
+@hypothesis.settings(max_examples=8)
+@hypothesis.given(seed=st.integers(0, 2**32 - 1), size=st.floats(0.7, 2.6))
+def test_topology_holds_and_what_is_left_is_said(make, seed, size):
+    surface = make(np.random.default_rng(seed))
+    n = max(4, round(10**size))
+    result = remesh(surface, n_vertices=n, seed=seed, max_iterations=15)
+    new, old = result.surface, prepare(surface).surface
+    assert topology.count_nonmanifold_edges(new.faces) == 0
+    assert topology.count_nonmanifold_points(new.faces) == 0
+    assert topology.is_oriented(new.faces)
+    assert len(np.unique(np.sort(new.faces, axis=1), axis=0)) == len(new.faces)
+    assert len(np.unique(new.faces)) == new.n_points
+    for count in (topology.euler_characteristic, lambda faces: len(topology.boundary_loops(faces))):
+        assert count(new.faces) == count(old.faces)
+    assert (
+        topology.connected_components(new.faces, new.n_points)[0]
+        == topology.connected_components(old.faces, old.n_points)[0]
+    )
+    assert np.isfinite(new.points).all()
+    said = " ".join(result.warnings)
+    assert new.n_points >= n or "instead of" in said or new.n_points > 0.98 * n
+    assert not result.validity.flipped or "turned" in said
+    assert not result.validity.new_intersections or "intersect" in said
