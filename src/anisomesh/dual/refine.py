@@ -105,26 +105,36 @@ def refine(
     -----
     1. While a cell is no disk, new sites go where it is farthest from its site; also where a closed component has
        fewer than four cells, where a cell has two arcs of the boundary, and where a boundary curve has fewer than
-       three. Nothing else moves, so little else breaks. The rounds are bounded; in practice one or two are enough.
+       three; and, as far as there is room, to corners and long arcs of creases that no cell belongs to. Nothing else
+       moves, so little else breaks.
     2. When all cells are disks with at most one arc the dual, glued along bisector chains, is homeomorphic to the
        surface (a regular cell complex; compare the closed ball property of Edelsbrunner and Shah 1997). Points on edges
        that occur twice make it a simplicial mesh.
-    3. What this inserted is taken away by edge collapses with the link condition, cheapest first.
-    4. Triangles that face away from the surface are turned back by edge flips and moves.
-    5. Edges are flipped where that gives better triangles in the metric, and the longest split if points are missing.
-    6. Triangles that intersect where the surface does not are taken apart; points that this takes are made up for by
+    3. Flips join vertices that follow each other on a crease.
+    4. What this inserted is taken away by edge collapses with the link condition, cheapest first.
+    5. Triangles that face away from the surface are turned back by edge flips and moves.
+    6. Edges are flipped where that gives better triangles in the metric, and the longest split if points are missing.
+    7. Triangles that intersect where the surface does not are taken apart; points that this takes are made up for by
        collapses elsewhere.
 
-    Where step 1 does not succeed (a tube thinner than the distance between sites) the surface itself, which is valid,
-    is coarsened by the same collapses. The paper inserts sites for every defect and optimises again;
-    that makes new defects as it mends old ones.
+    Where step 1 or 2 does not succeed (a tube thinner than the distance between sites) the surface itself, which is
+    valid, is coarsened by the same collapses. The paper inserts sites for every defect and optimises again; that makes
+    new defects as it mends old ones.
+
+    This ends. Step 1 takes ten rounds at most, none of which starts with more sites than a bound; step 2 as many as it
+    says; each cut of step 3 shortens a path; each round of step 4 takes a point away; step 5 has a bound on rounds and
+    keeps the best mesh met; each flip of step 6 raises a bounded sum, each split brings the number nearer; step 7 has a
+    bound on pairs looked at. Steps 4 to 7 keep the topology, change by change. So the mesh is a manifold with the
+    topology of the surface however they end; turned triangles and intersections that they leave are counted by
+    :func:`anisomesh.evaluation.validity.check_validity`.
     """
     n_start = len(sites)
     diagram, cells, arcs, creased, complete = _with_enough_sites(voronoi, sites, surface, features, n_vertices)
     reference = ClosestPoints(surface)
     links, kept = np.zeros((0, 2), dtype=np.int64), np.zeros(len(plain.points), dtype=bool)
     if complete:
-        points, faces, _ = simplicial_mesh(dual_mesh(diagram, cells, surface))
+        points, faces, complete = simplicial_mesh(dual_mesh(diagram, cells, surface))
+    if complete:
         space = placed(voronoi, diagram, cells, surface, features, arcs, creased, points, faces, scale)
         faces = join_along_creases(space, faces, creased.bridges, reference)
         links = creased.links[np.isin(edge_keys(creased.links), edge_keys(half_edges(faces)))]
