@@ -146,6 +146,8 @@ def refine(
     space, faces, links, kept = _untangled(space, faces, links, kept, reference, stop)
     if len(space) > n_vertices:
         space, faces, links = decimate(space, faces, n_vertices, reference, kept=kept, creases=links)
+        if len(space) > n_vertices:  # fewer than the creases need
+            space, faces, links = decimate(space, faces, n_vertices, reference)
         space, faces, links, _ = _untangled(space, faces, links, np.zeros(len(space), dtype=bool), reference, stop)
     roots = transfer_metric_roots(reference, metric_root(tensors), space)
     faces = flip_for_shape(space, faces, roots, reference, kept=links)

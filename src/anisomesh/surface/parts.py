@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 import numpy as np
 import numpy.typing as npt
 
@@ -12,7 +14,7 @@ from anisomesh.surface.mesh import Surface
 Outline = npt.NDArray[np.float64]
 
 
-def prism(outline: npt.ArrayLike, height: float) -> Surface:
+def prism(outline: Sequence[Sequence[float]] | Outline, height: float) -> Surface:
     """Return the prism over a simple polygon (n, 2), counter-clockwise, from z = 0 up, with the fewest triangles.
 
     Raises
@@ -33,7 +35,7 @@ def prism(outline: npt.ArrayLike, height: float) -> Surface:
     return Surface(np.concatenate([lower, upper]), np.concatenate([cap[:, ::-1], cap + n, *walls]))
 
 
-def revolution(profile: npt.ArrayLike, n_around: int = 32) -> Surface:
+def revolution(profile: Sequence[Sequence[float]] | Outline, n_around: int = 32) -> Surface:
     """Return the solid of revolution around the z axis of a profile (n, 2) of radii and heights, from axis to axis.
 
     Raises
@@ -67,8 +69,9 @@ def sparse_parts() -> dict[str, Surface]:
     turn = 2.0 * np.pi * np.arange(24) / 24
     teeth = np.where(np.arange(24) % 4 < 2, 1.0, 0.75)[:, None] * np.stack([np.cos(turn), np.sin(turn)], axis=1)
     hexagon = np.stack([np.cos(turn[::4]), np.sin(turn[::4])], axis=1)
-    stairs = [[0, 0], [4, 0], [4, 1], [3, 1], [3, 2], [2, 2], [2, 3], [1, 3], [1, 4], [0, 4]]
-    screw = [[0, 0], [1.0, 0], [1.0, 0.6], [0.5, 0.6], [0.5, 3.0], [0.4, 3.2], [0, 3.2]]
+    stairs: list[list[float]] = [[0, 0], [4, 0], [4, 1], [3, 1], [3, 2], [2, 2], [2, 3], [1, 3], [1, 4], [0, 4]]
+    screw: list[list[float]] = [[0, 0], [1.0, 0], [1.0, 0.6], [0.5, 0.6], [0.5, 3.0], [0.4, 3.2], [0, 3.2]]
+    washers: list[list[float]] = [[0, 0], [1, 0], [1, 0.5], [1.6, 0.5], [1.6, 1.0], [0.7, 1.0], [0.7, 2.0], [0, 2.0]]
     return {
         "cube": prism([[0, 0], [1, 0], [1, 1], [0, 1]], 1.0),
         "slab": prism([[0, 0], [3, 0], [3, 2], [0, 2]], 0.2),
