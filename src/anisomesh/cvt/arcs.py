@@ -11,6 +11,7 @@ from anisomesh._arrays import EmbeddedPoints, Points, Sites
 from anisomesh.cvt.diagram import Diagram
 from anisomesh.surface.curves import Curves, Floats, Ints
 
+LONG = 0.4  # of the distance between sites: a cell with a longer arc gets its site onto the curve
 _SAMPLES = 32  # of an arc, for the point closest to its site
 
 Mask = npt.NDArray[np.bool_]
@@ -46,10 +47,29 @@ class Arcs:
         """Length of each arc (A,) in the embedding."""
         return np.asarray(self.end - self.start)
 
-    def longest(self) -> Ints:
-        """Return the longest arc of each site that has one (n,), in the order of sites."""
+    def draw(self, sites: Sites, there: Mask, spacing: float) -> tuple[Sites, Mask]:
+        """Return the sites (S, d) with those that belong to the curves on them, and which these are (S,).
+
+        Parameters
+        ----------
+        sites
+            Positions (S, d).
+        there
+            Which of them are on the curves already (S,); others come if they have a long arc.
+        spacing
+            Distance between sites.
+
+        Notes
+        -----
+        A site goes to the place of its longest arc: Lloyd's algorithm on a curve.
+        """
         order = np.lexsort((self.length, self.site))
-        return order[changes(self.site[order][::-1])[::-1]]
+        longest = order[changes(self.site[order][::-1])[::-1]]
+        chosen = longest[there[self.site[longest]] | (self.length[longest] > LONG * spacing)]
+        drawn, mask = np.array(sites), np.zeros(len(sites), dtype=bool)
+        drawn[self.site[chosen]] = self.place[chosen]
+        mask[self.site[chosen]] = True
+        return drawn, mask
 
 
 def arcs_of(curves: Curves, diagram: Diagram) -> Arcs:

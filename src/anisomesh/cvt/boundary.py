@@ -14,7 +14,6 @@ from anisomesh.surface.boundary import BoundaryCurves, boundary_curves
 from anisomesh.surface.curves import Floats, Ints
 from anisomesh.surface.mesh import Surface
 
-_LONG = 0.4  # of the distance between sites: a cell with a longer arc gets its site onto the boundary
 _REACH = 0.75  # of the distance between sites: over which the turn of a corner is measured
 _SAME = 1e-6  # of the distance between sites: a site so near to a corner is the corner
 
@@ -85,15 +84,9 @@ class Boundary:
 
         Notes
         -----
-        A site on the boundary is in the middle of its arc, or at the corner in it: Lloyd's algorithm on a curve.
+        A site on the boundary is in the middle of its longest arc, or at the corner in it.
         """
-        arcs = self.arcs(diagram)
-        longest = arcs.longest()
-        chosen = longest[on_boundary[arcs.site[longest]] | (arcs.length[longest] > _LONG * self.spacing)]
-        drawn, mask = np.array(diagram.sites), np.zeros(len(diagram.sites), dtype=bool)
-        drawn[arcs.site[chosen]] = arcs.place[chosen]
-        mask[arcs.site[chosen]] = True
-        return drawn, mask
+        return self.arcs(diagram).draw(diagram.sites, on_boundary, self.spacing)
 
     def _arcs_of_corners(self, curve: Ints, start: Floats) -> Ints:
         """Return the arc that holds each corner, given curve and start of the arcs (A,)."""

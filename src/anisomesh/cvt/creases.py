@@ -20,7 +20,6 @@ from anisomesh.surface.mesh import Surface
 _SHORT_END = 0.1  # distances between sites: a loose end of a crease up to here is none
 _MIN_NETWORK, _MIN_PIECE, _LOOSE = 2.0, 0.5, 2.5  # the same that a network has, each of its curves, each loose end
 _MOST = 1.2  # of the distances between as many sites in a row: creases longer than that in all are too many
-LONG = 0.4  # of the distance between sites: a cell with a longer arc gets its site onto the crease
 
 
 @dataclass(frozen=True, eq=False)
@@ -88,11 +87,7 @@ class Creases:
         A site goes to the nearest corner in its cell, or else to the middle of its longest arc.
         """
         arcs = self.arcs(diagram)
-        longest = arcs.longest()
-        chosen = longest[on_crease[arcs.site[longest]] | (arcs.length[longest] > LONG * self.spacing)]
-        drawn, mask = np.array(diagram.sites), np.zeros(len(diagram.sites), dtype=bool)
-        drawn[arcs.site[chosen]] = arcs.place[chosen]
-        mask[arcs.site[chosen]] = True
+        drawn, mask = arcs.draw(diagram.sites, on_crease, self.spacing)
         arc, point = arcs.owners()
         site = arcs.site[arc]
         distance = np.linalg.norm(self.curves.positions[point] - diagram.sites[site], axis=1)

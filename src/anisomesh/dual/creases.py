@@ -8,8 +8,8 @@ from itertools import pairwise
 import numpy as np
 
 from anisomesh._arrays import EmbeddedPoints, Faces, Points, Sites
-from anisomesh.cvt.arcs import Arcs, Mask, changes, nearest_to_sites
-from anisomesh.cvt.creases import LONG, CreaseArcs, Creases
+from anisomesh.cvt.arcs import LONG, Arcs, Mask, changes, nearest_to_sites
+from anisomesh.cvt.creases import CreaseArcs, Creases
 from anisomesh.dual.cells import Cells
 from anisomesh.surface.closest import ClosestPoints
 from anisomesh.surface.curves import Ints
@@ -75,52 +75,62 @@ def creased_cells(creases: Creases, arcs: CreaseArcs, rim: Arcs, cells: Cells, s
     """
     positions, spacing = creases.curves.positions, creases.spacing
     component = cells.of_polygon[arcs.polygon].astype(np.int64)
-    n = len(cells.site)
     nearest = nearest_to_sites(arcs, creases.curves, np.arange(len(component)), sites)
+    at_rim = np.zeros(len(cells.site), dtype=bool)
+    at_rim[cells.of_polygon[rim.polygon]] = True
+    own, corner, place = _anchors(creases, arcs, rim, cells, sites, nearest)
+    belongs = ((arcs.corners == corner[component][:, None]) & (arcs.corners >= 0)).any(axis=1)
+    belongs |= own[component] == np.arange(len(component))
+    runs = _runs(creases, arcs, belongs)
+    links = component[np.array([[run[0], run[-1]] for run in runs], dtype=np.int64).reshape(-1, 2)]
+    gaps = [run for run in runs if len(run) > 2]
+    arc, point = arcs.owners()
+    further = point[(corner[component[arc]] != point) & ~at_rim[component[arc]]]
+    inner = [np.array(gap[1:-1]) for gap in gaps]
+    wide = [k[np.argmax(arcs.length[k])] for k in inner if arcs.length[k].sum() > LONG * spacing]
+    wide.sort(key=lambda k: -arcs.length[k])
+    cell = np.flatnonzero((own >= 0) | (corner >= 0))
+    start, end = (creases.curves.at(at[own[cell]], arcs.curve[own[cell]]) for at in (arcs.start, arcs.end))
+    return CreasedCells(
+        cell=cell,
+        place=place[cell],
+        chord=end - start,
+        bent=_bent(creases, arcs, own[cell], end - start) & (own[cell] >= 0),
+        corner=(corner[cell] >= 0) | at_rim[cell],
+        missing=np.concatenate([positions[further], nearest[np.array(wide, dtype=np.int64)]]),
+        links=links[links[:, 0] != links[:, 1]],
+        bridges=[component[gap].tolist() for gap in gaps],
+    )
+
+
+def _anchors(
+    creases: Creases, arcs: CreaseArcs, rim: Arcs, cells: Cells, sites: Sites, nearest: EmbeddedPoints
+) -> tuple[Ints, Ints, EmbeddedPoints]:
+    """Return for each cell its arc (C,), or else its corner (C,), -1 for none, and the place of its vertex (C, d).
+
+    ``nearest`` are the points of the arcs closest to their sites (A, d).
+    """
+    positions, spacing = creases.curves.positions, creases.spacing
+    component = cells.of_polygon[arcs.polygon]
+    own, corner = np.full((2, len(cells.site)), -1, dtype=np.int64)
+    place = np.zeros((len(cells.site), positions.shape[1]))
     near = np.linalg.norm(nearest - sites[arcs.site], axis=1) < _NEAR * spacing
     order = np.argsort(arcs.length, kind="stable")
     order = order[((arcs.length > LONG * spacing) | near)[order]]
-    place = np.full((n, positions.shape[1]), np.nan)
-    own_arc, corner = np.full((2, n), -1, dtype=np.int64)
-    own_arc[component[order]] = order
+    own[component[order]] = order  # of several the last, the longest, stays; so below
     place[component[order]] = arcs.place[order]
     arc, point = arcs.owners()
     order = np.argsort(-np.linalg.norm(positions[point] - sites[arcs.site[arc]], axis=1), kind="stable")
     corner[component[arc[order]]] = point[order]
     place[corner >= 0] = positions[corner[corner >= 0]]
-    at_rim = np.zeros(n, dtype=bool)
-    rim_cell = cells.of_polygon[rim.polygon].astype(np.int64)
-    at_rim[rim_cell] = True
+    rim_cell = cells.of_polygon[rim.polygon]
     order = np.argsort(rim.length, kind="stable")
     place[rim_cell[order]] = rim.place[order]
-    cornered = np.flatnonzero(at_rim & (corner >= 0))
-    away = np.linalg.norm(place[cornered] - positions[corner[cornered]], axis=1) > _SAME * spacing
-    corner[cornered[away]] = -1
-    own_arc[at_rim | (corner >= 0)] = -1
-    belongs = (arcs.corners == corner[component][:, None]) & (arcs.corners >= 0)
-    belongs = belongs.any(axis=1) | (own_arc[component] == np.arange(len(component)))
-    further = (corner[component[arc]] != point) & ~at_rim[component[arc]]
-    runs = _runs(creases, arcs, belongs)
-    links = component[np.array([[run[0], run[-1]] for run in runs], dtype=np.int64).reshape(-1, 2)]
-    gaps = [run for run in runs if len(run) > 2]
-    wide = [
-        gap[1 + int(np.argmax(arcs.length[gap[1:-1]]))] for gap in gaps if arcs.length[gap[1:-1]].sum() > LONG * spacing
-    ]
-    alone = np.array(wide, dtype=np.int64)
-    alone = alone[np.argsort(-arcs.length[alone], kind="stable")]
-    cell = np.flatnonzero((own_arc >= 0) | (corner >= 0))
-    start, end = (creases.curves.at(at[own_arc[cell]], arcs.curve[own_arc[cell]]) for at in (arcs.start, arcs.end))
-    chord = end - start
-    return CreasedCells(
-        cell=cell,
-        place=place[cell],
-        chord=chord,
-        bent=_bent(creases, arcs, own_arc[cell], chord) & (own_arc[cell] >= 0),
-        corner=(corner[cell] >= 0) | at_rim[cell],
-        missing=np.concatenate([positions[point[further]], nearest[alone]]),
-        links=links[links[:, 0] != links[:, 1]],
-        bridges=[component[gap].tolist() for gap in gaps],
-    )
+    away = np.linalg.norm(place - positions[corner], axis=1) > _SAME * spacing
+    own[corner >= 0] = -1
+    own[rim_cell] = -1
+    corner[away] = -1
+    return own, corner, place
 
 
 def _bent(creases: Creases, arcs: CreaseArcs, which: Ints, chord: EmbeddedPoints) -> Mask:

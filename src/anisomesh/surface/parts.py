@@ -82,9 +82,7 @@ def sparse_parts() -> dict[str, Surface]:
         "hexagon": prism(hexagon, 0.8),
         "gear": prism(teeth, 0.4),
         "screw": revolution(screw, 32),
-        "washer stack": revolution(
-            [[0, 0], [1, 0], [1, 0.5], [1.6, 0.5], [1.6, 1.0], [0.7, 1.0], [0.7, 2], [0, 2]], 32
-        ),
+        "washer stack": revolution(washers, 32),
     }
 
 
