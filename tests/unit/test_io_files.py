@@ -317,3 +317,37 @@ def test_counts_of_gmsh_files_are_checked_before_the_library_makes_room(tmp_path
         changed = data[:place] + (10**9).to_bytes(8, "little") + data[place + 8 :]
     with pytest.raises(ValueError, match=r"promises \d+ nodes"):
         check_counts(changed)
+
+
+@pytest.mark.parametrize("binary", [True, False])
+def test_blocks_of_gmsh_4_are_checked_before_the_library_makes_room(tmp_path, binary):
+    """Regression: the counts of blocks in files of version 4 were believed, and the numbers of nodes."""
+    path = tmp_path / "a.msh"
+    meshio.Mesh(BOX.points, [("triangle", BOX.faces)]).write(path, file_format="gmsh", binary=binary)
+    data = path.read_bytes()
+    n, m = BOX.n_points, BOX.n_faces
+    for section, count in (("Nodes", n), ("Elements", m)):
+        start = data.index(b"\n", data.index(b"$" + section.encode())) + 1
+        if binary:
+            place = start + 4 * 8 + 3 * 4  # behind the four numbers of the section and three of the block
+            assert int.from_bytes(data[place : place + 8], "little") == count
+            changed = data[:place] + (10**9).to_bytes(8, "little") + data[place + 8 :]
+        else:
+            line = data.index(b"\n", start) + 1
+            place = data.index(b" %d" % count, line)
+            changed = data[:place] + b" 1000000000" + data[place + len(b" %d" % count) :]
+        with pytest.raises(ValueError, match="a block promises"):
+            check_counts(changed)
+        path.write_bytes(changed)
+        with pytest.raises(MeshFileError):
+            load(path)
+    place = data.index(b"$Nodes")
+    start = data.index(b"\n", place) + 1
+    if binary:
+        first = start + 4 * 8 + 3 * 4 + 8
+        changed = data[:first] + (10**12).to_bytes(8, "little") + data[first + 8 :]
+    else:
+        lines = data[start:].split(b"\n")
+        changed = data[:start] + b"\n".join([*lines[:2], b"1000000000000", *lines[3:]])
+    with pytest.raises(ValueError, match="the number of a node is 1000000000000"):
+        check_counts(changed)
