@@ -13,11 +13,11 @@ from typing import Any
 import numpy as np
 
 from anisomesh.batch.inputs import Input, inputs_of
-from anisomesh.batch.isolation import isolated
 from anisomesh.batch.methods import METHODS, Produced
 from anisomesh.batch.suite import Method, Suite
 from anisomesh.errors import AnisomeshError
 from anisomesh.evaluation.report import evaluate
+from anisomesh.isolation import isolated
 from anisomesh.surface.mesh import Surface
 from anisomesh.surface.prepare import prepare
 

@@ -11,7 +11,7 @@ from typing import Annotated
 
 import typer
 
-from anisomesh.cli import benchmark, demo, evaluate, figure, info, remesh
+from anisomesh.cli import benchmark, dataset, demo, evaluate, figure, info, remesh
 from anisomesh.errors import AnisomeshError
 
 # The base class of all errors in the arguments; it is public only through this subclass.
@@ -29,6 +29,7 @@ app.add_typer(figure.app, name="figure")
 app.command("info")(info.command)
 app.command("demo")(demo.command)
 app.command("benchmark")(benchmark.command)
+app.add_typer(dataset.app, name="dataset")
 
 
 def _print_version(wanted: bool) -> None:
@@ -46,7 +47,7 @@ def _main(
         bool, typer.Option("--version", help="Print the version and exit.", callback=_print_version, is_eager=True)
     ] = False,
 ) -> None:
-    """Turn any triangle mesh into an anisotropic one with about as many vertices as you ask for."""
+    """Turn any triangle mesh into an anisotropic one with as many vertices as you ask for."""
     if context.invoked_subcommand is None:
         typer.echo(context.get_help())
         raise typer.Exit(2)

@@ -5,8 +5,8 @@ import os
 
 import pytest
 
-from anisomesh.batch.isolation import isolated
 from anisomesh.errors import AnisomeshError
+from anisomesh.isolation import isolated
 
 
 def test_result_and_error_come_back():

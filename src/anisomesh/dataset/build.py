@@ -1,0 +1,252 @@
+"""Building a data set: many shapes in parallel, each in a process of its own; a build that was stopped goes on."""
+
+from __future__ import annotations
+
+import csv
+import hashlib
+import json
+import os
+from collections.abc import Callable, Iterator
+from concurrent.futures import FIRST_COMPLETED, Future, ThreadPoolExecutor, wait
+from dataclasses import asdict, dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from anisomesh.dataset.implicit import Blobs
+from anisomesh.dataset.make import Made, Recipe, UnsuitableError, items_of_blobs, items_of_mesh
+from anisomesh.errors import AnisomeshError, MeshFileError, OptionError
+from anisomesh.isolation import isolated
+from anisomesh.learn.items import save_item
+from anisomesh.surface.io import FORMATS, load
+
+MANIFEST = "manifest.jsonl"
+_VERSION = 1  # of the items; another one makes a build start anew
+
+Row = dict[str, Any]
+
+
+@dataclass(frozen=True, kw_only=True)
+class Source:
+    """A shape that items are made of.
+
+    Attributes
+    ----------
+    name
+        Unique in the data set; the items are named after it.
+    family
+        Shapes of one family (near-duplicates) are either all for training or all for validation.
+    path
+        The mesh file, None for blobs made by code.
+    seed
+        Of the blobs and of the variants.
+    """
+
+    name: str
+    family: str
+    path: Path | None
+    seed: int
+
+    def fingerprint(self, recipe: Recipe) -> str:
+        """Return a number that changes with the file, the seed and the recipe."""
+        text = json.dumps([_VERSION, self.name, self.seed, asdict(recipe)], sort_keys=True).encode()
+        content = self.path.read_bytes() if self.path is not None else b""
+        return hashlib.sha256(text + content).hexdigest()[:16]
+
+
+def sources_of(folder: Path | None, n_blobs: int) -> list[Source]:
+    """Return the meshes of a folder and of those below it, and so many shapes made by code.
+
+    Parameters
+    ----------
+    folder
+        Its families are read from ``manifest.csv`` (columns ``file``, ``family``) there or one folder up, if there is
+        one; else every mesh is its own family. None for no meshes.
+    n_blobs
+        Number of shapes made by code.
+
+    Raises
+    ------
+    OptionError
+        If there is nothing to build from.
+    """
+    found = []
+    if folder is not None:
+        if not folder.is_dir():
+            raise OptionError(f"{folder} is no folder of meshes")
+        families = _families(folder)
+        for path in sorted(path for path in folder.rglob("*") if path.suffix.lower() in FORMATS):
+            name = "-".join(path.relative_to(folder).with_suffix("").parts)
+            found.append(Source(name=name, family=families.get(path.resolve(), name), path=path, seed=_number(name)))
+    for number in range(n_blobs):
+        name = f"blobs-{number:04d}"
+        found.append(Source(name=name, family=name, path=None, seed=_number(name)))
+    if not found:
+        raise OptionError(
+            f"{folder} has no mesh in one of {', '.join(sorted(FORMATS))}, and no shapes by code are asked for"
+        )
+    names = [source.name for source in found]
+    twice = {name for name in names if names.count(name) > 1}
+    if twice:
+        raise OptionError(f"two meshes have the same name but for the format: {', '.join(sorted(twice))}")
+    return found
+
+
+def build(
+    sources: list[Source],
+    out: Path,
+    recipe: Recipe,
+    *,
+    validation: float = 0.12,
+    workers: int = 2,
+    on_row: Callable[[Row, int, int], None] = lambda row, number, total: None,
+) -> list[Row]:
+    """Make the items that are not there yet and return the rows of all sources, in their order.
+
+    Parameters
+    ----------
+    sources
+        What to make items of.
+    out
+        Folder of the items and of ``manifest.jsonl``, one row a source; it is made if it is not there.
+    recipe
+        How items are made.
+    validation
+        Share of the families that are for validation; which ones depends on their names alone.
+    workers
+        Sources worked on at once, each in a process of its own.
+    on_row
+        Called with a row, its number and the number of rows to come in all.
+
+    Returns
+    -------
+    rows
+        With ``name, family, split, fingerprint``; ``status`` ``kept`` with the ``items``, ``dropped`` with the
+        ``reason`` where a shape is unsuitable, ``failed`` with the ``reason`` where it cannot be read or mended, or
+        ended the process. None of these is tried again unless its file or the recipe changes.
+    """
+    if not 0.0 <= validation < 1.0 or workers < 1:
+        raise OptionError(f"validation = {validation}, workers = {workers}; expected a share below 1, and 1 or more")
+    out.mkdir(parents=True, exist_ok=True)
+    known = {row["name"]: row for row in read_manifest(out)}
+    starts = {source.name: _start(source, recipe, validation) for source in sources}
+    jobs = [source for source in sources if not _is_done(known.get(source.name), starts[source.name], out)]
+    for number, (source, row) in enumerate(_in_parallel(jobs, out, recipe, workers), 1):
+        known[source.name] = {**starts[source.name], **row}
+        _append(out / MANIFEST, known[source.name])
+        on_row(known[source.name], number, len(jobs))
+    return [{**known[name], "split": start["split"]} for name, start in starts.items()]
+
+
+def read_manifest(folder: Path) -> list[Row]:
+    """Return the rows of a data set, the last one of each source; none if there is no list.
+
+    Raises
+    ------
+    MeshFileError
+        If a line but the last is no row. (The last may have been cut off when a build was killed.)
+    """
+    path = folder / MANIFEST
+    lines = path.read_text(encoding="utf-8").split("\n") if path.exists() else []
+    rows: dict[str, Row] = {}
+    for number, line in enumerate(lines, 1):
+        if not line:
+            continue
+        try:
+            row = json.loads(line)
+            rows[row["name"]] = row
+        except (json.JSONDecodeError, KeyError, TypeError) as error:
+            if number == len(lines):
+                break
+            raise MeshFileError(f"{path}, line {number}: no row of a data set; move the file away") from error
+    return list(rows.values())
+
+
+def _start(source: Source, recipe: Recipe, validation: float) -> Row:
+    return {
+        "name": source.name,
+        "family": source.family,
+        "split": "validation" if _number(source.family) / 2**32 < validation else "training",
+        "fingerprint": source.fingerprint(recipe),
+    }
+
+
+def _is_done(row: Row | None, start: Row, out: Path) -> bool:
+    if row is None or row["fingerprint"] != start["fingerprint"]:
+        return False
+    return all((out / item["file"]).is_file() for item in row.get("items", []))
+
+
+def _in_parallel(jobs: list[Source], out: Path, recipe: Recipe, workers: int) -> Iterator[tuple[Source, Row]]:
+    """Yield sources and what became of them as they end, never more than twice as many begun as there are workers."""
+    waiting: dict[Future[Row], Source] = {}
+    left = iter(jobs)
+    with ThreadPoolExecutor(workers) as pool:
+        try:
+            while True:
+                for source in left:
+                    waiting[pool.submit(_guarded, source, out, recipe)] = source
+                    if len(waiting) == 2 * workers:
+                        break
+                if not waiting:
+                    return
+                for future in wait(waiting, return_when=FIRST_COMPLETED).done:
+                    yield waiting.pop(future), future.result()
+        finally:
+            pool.shutdown(cancel_futures=True)
+
+
+def _guarded(source: Source, out: Path, recipe: Recipe) -> Row:
+    """Make the items of a source in a new process; whatever goes wrong is its row."""
+    try:
+        return isolated(make)(source, out, recipe)
+    except UnsuitableError as error:
+        return {"status": "dropped", "reason": str(error)}
+    except Exception as error:  # one bad mesh is not to end a build of hundreds
+        known = isinstance(error, AnisomeshError)
+        return {"status": "failed", "reason": str(error) if known else f"{type(error).__name__}: {error}"}
+
+
+def make(source: Source, out: Path, recipe: Recipe) -> Row:
+    """Make and write the items of a source; return the part of its row that says so."""
+    rng = np.random.default_rng(source.seed)
+    made: list[Made]
+    if source.path is None:
+        made = items_of_blobs(Blobs.random(rng), recipe, rng)
+    else:
+        made = items_of_mesh(load(source.path), recipe, rng)
+    items = []
+    for entry in made:
+        name = f"{source.name}.{entry.kind}.npz"
+        save_item(entry.item, out / name)
+        items.append({"file": name, "kind": entry.kind, **entry.facts})
+    return {"status": "kept", "items": items}
+
+
+def _families(folder: Path) -> dict[Path, str]:
+    for base in (folder, folder.parent):
+        path = base / "manifest.csv"
+        if path.is_file():
+            with path.open(newline="", encoding="utf-8") as file:
+                rows = list(csv.DictReader(file))
+            if rows and {"file", "family"} <= set(rows[0]):
+                return {(base / row["file"]).resolve(): row["family"] for row in rows}
+    return {}
+
+
+def _number(text: str) -> int:
+    """Return a number below 2^32 that depends on a text alone."""
+    return int.from_bytes(hashlib.sha256(text.encode()).digest()[:4], "big")
+
+
+def _append(path: Path, row: Row) -> None:
+    """Write a row at the end of the list, to the disk; what is left of one that was cut off goes first."""
+    if path.exists():
+        content = path.read_bytes()
+        if content and not content.endswith(b"\n"):
+            os.truncate(path, content.rfind(b"\n") + 1)
+    with path.open("a", encoding="utf-8") as file:
+        file.write(json.dumps(row, allow_nan=False) + "\n")
+        file.flush()
+        os.fsync(file.fileno())

@@ -1,0 +1,221 @@
+"""From one shape to the items that a network learns from: the even mesh, and other meshes of the same shape."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass, field
+from typing import Any, Literal
+
+import numpy as np
+
+from anisomesh._arrays import PointMask, Points, PointTensors
+from anisomesh.dataset.implicit import Blobs
+from anisomesh.dual.decimate import decimate
+from anisomesh.embedding.direct import embed
+from anisomesh.errors import AnisomeshError, OptionError
+from anisomesh.evaluation.quality import transfer_metric_roots
+from anisomesh.learn.items import Item
+from anisomesh.metric.curvature import Curvature, principal_curvatures
+from anisomesh.metric.tensor import curvature_metric, metric_root
+from anisomesh.pipeline import remesh
+from anisomesh.surface.closest import ClosestPoints
+from anisomesh.surface.geometry import Frame, thickness, unit_frame
+from anisomesh.surface.mesh import Surface
+from anisomesh.surface.prepare import prepare
+
+VARIANTS = ("decimated", "stretched")
+_REGULAR = 0.4330127  # thickness of an equilateral triangle
+_COUNTS = (0.6, 1.6)  # of the wanted number of points that a mesh may have without being made anew
+_EVEN = 0.7  # mean thickness, as a share of the regular one, from which on a mesh is even
+_DECIMATED, _STRETCHED = (0.35, 0.75), (0.5, 1.0)  # of the points that such variants have
+_RATIOS = (2.0, 5.0)  # of the sides of stretched triangles
+_SECONDS = 120.0  # for a remesh
+
+MetricOn = Callable[[Surface], tuple[PointTensors, PointMask]]
+
+
+@dataclass(frozen=True, kw_only=True)
+class Recipe:
+    """How items are made.
+
+    Attributes
+    ----------
+    target
+        Points that the even mesh of a shape has, about.
+    variants
+        Other meshes of every shape: ``"decimated"`` (quadric collapses: irregular triangles) and ``"stretched"``
+        (triangles stretched in a random direction that has nothing to do with the curvature).
+    evening
+        How meshes with other numbers of points, or with bad triangles, are made even: ``"cvt"``, our own remesh with a
+        uniform metric, or ``"tetwild"``, the boundary of pytetwild's tetrahedra, as in the paper, and then the same.
+    max_residual
+        Largest relative residual of the direct embedding.
+    min_stretch
+        Least mean stretch; shapes below it are flat or round everywhere.
+    iterations
+        Steps of the direct embedding.
+    """
+
+    target: int = 5_000
+    variants: tuple[str, ...] = VARIANTS
+    evening: Literal["cvt", "tetwild"] = "cvt"
+    max_residual: float = 0.4
+    min_stretch: float = 1.05
+    iterations: int = 30
+
+    def __post_init__(self) -> None:
+        if self.target < 100:
+            raise OptionError(f"target = {self.target}; expected at least 100 points")
+        for name in self.variants:
+            if name not in VARIANTS:
+                raise OptionError(f"variant {name!r} is unknown; expected some of {', '.join(VARIANTS)}")
+        if self.evening not in ("cvt", "tetwild"):
+            raise OptionError(f"evening = {self.evening!r}; expected 'cvt' or 'tetwild'")
+
+
+class UnsuitableError(AnisomeshError):
+    """A shape is left out of a data set, for a reason that is no fault."""
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Made:
+    """An item, what kind of mesh it is, and what is written of it in the list of the data set."""
+
+    kind: str
+    item: Item
+    facts: dict[str, Any] = field(default_factory=dict)
+
+
+def items_of_mesh(surface: Surface, recipe: Recipe, rng: np.random.Generator) -> list[Made]:
+    """Return the items of a mesh: its even mesh first, then the variants.
+
+    Parameters
+    ----------
+    surface
+        Any mesh, in any units.
+    recipe
+        How items are made.
+    rng
+        Of the variants.
+
+    Raises
+    ------
+    UnsuitableError
+        If it is flat or round everywhere, or its embedding has too large a residual.
+    AnisomeshError
+        If it is no mesh, or cannot be made even.
+
+    Notes
+    -----
+    The targets of variants are the metric of the even mesh, from the closest point: a network that sees a bad
+    triangulation is to find what a good one shows.
+    """
+    clean = evened(prepare(surface).surface, recipe)
+    clean = clean.with_points(unit_frame(clean.points).to_unit(clean.points))
+    curvature = principal_curvatures(clean)
+    reference, roots = ClosestPoints(clean), metric_root(curvature_metric(clean, curvature))
+
+    def metric_on(mesh: Surface) -> tuple[PointTensors, PointMask]:
+        facet, weights = reference.locate(mesh.points)
+        nearest = clean.faces[facet, weights.argmax(axis=1)]
+        found = transfer_metric_roots(reference, roots, mesh.points)
+        return found @ found, np.asarray(curvature.trusted[nearest])
+
+    return _items(clean, metric_on, lambda points: points, recipe, rng)
+
+
+def items_of_blobs(blobs: Blobs, recipe: Recipe, rng: np.random.Generator) -> list[Made]:
+    """Return the same for a shape whose curvature is known exactly, at the points of every mesh of it."""
+    rough = blobs.mesh()
+    even = remesh(rough, n_vertices=recipe.target, metric="uniform", threads=1, time_limit=_SECONDS).surface
+    points = blobs.project(even.points)
+    frame = unit_frame(points)
+
+    def metric_on(mesh: Surface) -> tuple[PointTensors, PointMask]:
+        curvature = blobs.curvature(frame.to_model(mesh.points))
+        scaled = Curvature(
+            values=curvature.values * frame.scale, directions=curvature.directions, trusted=curvature.trusted
+        )
+        return curvature_metric(mesh, scaled), scaled.trusted
+
+    clean = Surface(frame.to_unit(points), even.faces)
+    return _items(clean, metric_on, _settling(blobs, frame), recipe, rng)
+
+
+def evened(surface: Surface, recipe: Recipe) -> Surface:
+    """Return a mesh of about the wanted number of even triangles: the same one, if it is like that."""
+    shape = thickness(surface.points[surface.faces]) / _REGULAR
+    low, high = (share * recipe.target for share in _COUNTS)
+    if low <= surface.n_points <= high and shape.mean() >= _EVEN:
+        return surface
+    if recipe.evening == "tetwild":
+        surface = _tetwild(surface)
+    result = remesh(surface, n_vertices=recipe.target, metric="uniform", threads=1, time_limit=_SECONDS)
+    if result.validity.flipped or result.surface.n_points > high:
+        raise UnsuitableError(f"cannot be made even: {'; '.join(result.warnings)}")
+    return result.surface
+
+
+def _items(
+    clean: Surface, metric_on: MetricOn, settle: Callable[[Points], Points], recipe: Recipe, rng: np.random.Generator
+) -> list[Made]:
+    even = _made("even", clean, metric_on, recipe)
+    residual, stretch = even.facts["residual"], even.facts["stretch"]
+    if residual > recipe.max_residual:
+        raise UnsuitableError(f"the embedding is off the metric by {residual:.2f}, more than {recipe.max_residual}")
+    if stretch < recipe.min_stretch:
+        raise UnsuitableError(f"flat or round everywhere: the mean stretch is {stretch:.3f}")
+    makers = {"decimated": _decimated, "stretched": _stretched}
+    meshes = {kind: makers[kind](clean, rng) for kind in recipe.variants}
+    variants = {kind: mesh.with_points(settle(mesh.points)) for kind, mesh in meshes.items()}
+    return [even, *(_made(kind, mesh, metric_on, recipe) for kind, mesh in variants.items())]
+
+
+def _made(kind: str, mesh: Surface, metric_on: MetricOn, recipe: Recipe) -> Made:
+    tensors, trusted = metric_on(mesh)
+    embedding = embed(mesh, tensors, max_iterations=recipe.iterations)
+    facts = {
+        "points": mesh.n_points,
+        "faces": mesh.n_faces,
+        "residual": round(embedding.residual, 4),
+        "stretch": round(embedding.stretch.asked_mean, 4),
+        "trusted": round(float(trusted.mean()), 4),
+    }
+    return Made(kind=kind, item=Item.of(mesh, tensors, embedding.points[:, 3:], trusted), facts=facts)
+
+
+def _decimated(clean: Surface, rng: np.random.Generator) -> Surface:
+    n = round(rng.uniform(*_DECIMATED) * clean.n_points)
+    points, faces, _ = decimate(clean.points, clean.faces, n, ClosestPoints(clean))
+    return Surface(points, faces)
+
+
+def _stretched(clean: Surface, rng: np.random.Generator) -> Surface:
+    direction = rng.normal(size=3)
+    direction /= np.linalg.norm(direction)
+    square = rng.uniform(*_RATIOS) ** 2
+    tensor = np.eye(3) + (square - 1.0) * np.outer(direction, direction)
+    n = round(rng.uniform(*_STRETCHED) * clean.n_points)
+    tensors = np.tile(tensor, (clean.n_points, 1, 1))
+    return remesh(clean, n_vertices=n, metric=tensors, threads=1, time_limit=_SECONDS).surface
+
+
+def _settling(blobs: Blobs, frame: Frame) -> Callable[[Points], Points]:
+    return lambda points: frame.to_unit(blobs.project(frame.to_model(points)))
+
+
+def _tetwild(surface: Surface) -> Surface:
+    """Return the boundary of the tetrahedra that pytetwild makes of a surface."""
+    try:
+        import pytetwild
+    except ImportError as error:
+        raise OptionError("evening with tetwild needs the package pytetwild: pip install pytetwild") from error
+    points, cells = pytetwild.tetrahedralize(surface.points, surface.faces, optimize=False, quiet=True)[:2]
+    sides = np.sort(
+        np.concatenate([cells[:, [1, 2, 3]], cells[:, [0, 3, 2]], cells[:, [0, 1, 3]], cells[:, [0, 2, 1]]])
+    )
+    faces = np.concatenate([cells[:, [1, 2, 3]], cells[:, [0, 3, 2]], cells[:, [0, 1, 3]], cells[:, [0, 2, 1]]])
+    _, first, count = np.unique(sides, axis=0, return_index=True, return_counts=True)
+    outer = faces[first[count == 1]]
+    used, outer = np.unique(outer, return_inverse=True)
+    return prepare(Surface(np.asarray(points)[used], outer.reshape(-1, 3))).surface

@@ -1,0 +1,1 @@
+"""Learning the embedding: what a network is trained on."""

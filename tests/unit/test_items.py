@@ -1,0 +1,144 @@
+"""Items of a data set: written and read again, damaged files refused, targets of variants against the clean shape."""
+
+import numpy as np
+import pytest
+
+from anisomesh.dataset.implicit import Blobs
+from anisomesh.dataset.make import Recipe, UnsuitableError, evened, items_of_blobs, items_of_mesh
+from anisomesh.errors import MeshFileError, OptionError
+from anisomesh.evaluation.distance import surface_distance
+from anisomesh.learn.items import Item, load_item, save_item
+from anisomesh.metric.tensor import validate_metric
+from anisomesh.surface.geometry import thickness
+from anisomesh.surface.mesh import Surface
+from anisomesh.surface.shapes import box, ellipsoid, sphere
+
+RECIPE = Recipe(target=500)
+
+
+@pytest.fixture(scope="module")
+def made():
+    return items_of_mesh(ellipsoid((1.0, 0.5, 0.3), 3), RECIPE, np.random.default_rng(0))
+
+
+def random_item(n=30):
+    rng = np.random.default_rng(0)
+    surface = sphere(1)
+    root = rng.normal(size=(surface.n_points, 3, 3))
+    tensors = root @ root.transpose(0, 2, 1) + np.eye(3)
+    extra = rng.normal(size=(surface.n_points, 5))
+    return surface, tensors, Item.of(surface, tensors, extra, rng.random(surface.n_points) > 0.5)
+
+
+def test_an_item_comes_back_from_its_file_as_it_was(tmp_path):
+    surface, tensors, item = random_item()
+    save_item(item, tmp_path / "a.npz")
+    again = load_item(tmp_path / "a.npz")
+    for name in ("points", "faces", "metric", "extra", "trusted"):
+        np.testing.assert_array_equal(getattr(again, name), getattr(item, name))
+        assert getattr(again, name).dtype == getattr(item, name).dtype
+    np.testing.assert_allclose(again.tensors, tensors, rtol=1e-6)
+    np.testing.assert_allclose(again.surface.points, surface.points, rtol=1e-6)
+
+
+@pytest.mark.parametrize("damage", ["cut", "empty", "missing", "text", "shape", "pickle"])
+def test_damaged_files_are_refused(tmp_path, damage):
+    path = tmp_path / "a.npz"
+    item = random_item()[2]
+    save_item(item, path)
+    data = path.read_bytes()
+    if damage == "missing":
+        path.unlink()
+    elif damage == "shape":
+        np.savez(
+            path, points=item.points[:5], faces=item.faces, metric=item.metric, extra=item.extra, trusted=item.trusted
+        )
+    elif damage == "pickle":
+        names = ("faces", "metric", "extra", "trusted")
+        np.savez(path, points=np.array([{}], dtype=object), **{name: getattr(item, name) for name in names})
+    else:
+        path.write_bytes({"cut": data[: len(data) // 2], "empty": b"", "text": b"hello"}[damage])
+    with pytest.raises(MeshFileError, match=r"a\.npz"):
+        load_item(path)
+
+
+def test_the_items_of_a_mesh_are_its_even_mesh_and_the_variants(made):
+    assert [entry.kind for entry in made] == ["even", "decimated", "stretched"]
+    even = made[0].item.surface
+    assert 300 <= even.n_points <= 800
+    for entry in made:
+        mesh = entry.item.surface
+        assert np.linalg.norm(np.ptp(mesh.points, axis=0)) == pytest.approx(1.0, abs=0.03)
+        assert surface_distance(even, mesh, 2_000).hausdorff < 0.03
+        validate_metric(entry.item.tensors, mesh)
+        assert entry.facts["points"] == mesh.n_points
+        assert entry.facts["residual"] <= RECIPE.max_residual
+    assert made[1].item.surface.n_points <= 0.76 * even.n_points
+    shapes = [thickness(entry.item.surface.points[entry.item.surface.faces]).mean() for entry in made]
+    assert shapes[2] < 0.75 * shapes[0]
+
+
+def test_variants_have_the_metric_of_the_clean_mesh_not_their_own(made):
+    clean = made[0].item
+    for entry in made[1:]:
+        for point, tensor in zip(entry.item.points[::7], entry.item.tensors[::7], strict=True):
+            nearest = np.argmin(np.linalg.norm(clean.points - point, axis=1))
+            same = np.linalg.norm(clean.points[nearest] - point) < 1e-6
+            error = np.abs(tensor - clean.tensors[nearest]).max() / np.abs(tensor).max()
+            assert error < (1e-3 if same else 1.0)
+    exact = np.isin(made[1].item.points.round(6), clean.points.round(6)).all(axis=1)
+    assert exact.mean() > 0.9  # decimation keeps points
+
+
+def test_items_of_shapes_by_code_have_exact_curvature_at_every_point():
+    blobs = Blobs.random(np.random.default_rng(3))
+    made = items_of_blobs(blobs, RECIPE, np.random.default_rng(0))
+    assert [entry.kind for entry in made] == ["even", "decimated", "stretched"]
+    frames = []
+    for entry in made:
+        tensors = entry.item.tensors
+        eigenvalues = np.linalg.eigvalsh(tensors)
+        np.testing.assert_allclose(eigenvalues[:, :2], 1.0, atol=1e-4)  # the paper's metric: 1, 1, r^2
+        frames.append(np.sqrt(eigenvalues[:, 2]).mean())
+        assert entry.item.trusted.all()
+    np.testing.assert_allclose(frames, frames[0], rtol=0.15)
+
+
+def test_round_and_flat_shapes_are_unsuitable():
+    for shape in (sphere(3), box(n=8)):
+        with pytest.raises(UnsuitableError, match="flat or round everywhere"):
+            items_of_mesh(shape, Recipe(target=500, min_stretch=1.35), np.random.default_rng(0))
+
+
+def test_an_even_mesh_of_the_right_size_is_left_alone_and_others_are_not():
+    good = sphere(3)
+    assert evened(good, Recipe(target=600)) is good
+    for recipe, mesh in (
+        (Recipe(target=300), good),
+        (Recipe(target=600), good.with_points(good.points * [1.0, 1.0, 0.3])),
+        (Recipe(target=600), box(n=1)),
+    ):
+        made = evened(mesh, recipe)
+        assert made.n_points == recipe.target
+        assert thickness(made.points[made.faces]).mean() > 0.3
+
+
+def test_the_same_seed_gives_the_same_items(made):
+    again = items_of_mesh(ellipsoid((1.0, 0.5, 0.3), 3), RECIPE, np.random.default_rng(0))
+    for first, second in zip(made, again, strict=True):
+        np.testing.assert_array_equal(first.item.points, second.item.points)
+        np.testing.assert_array_equal(first.item.extra, second.item.extra)
+
+
+@pytest.mark.parametrize("wrong", [{"target": 10}, {"variants": ("melted",)}, {"evening": "iron"}])
+def test_recipes_that_cannot_be_are_refused(wrong):
+    with pytest.raises(OptionError):
+        Recipe(**wrong)
+
+
+def test_evening_with_a_package_that_is_not_there_names_it():
+    try:
+        import pytetwild  # noqa: F401
+    except ImportError:
+        with pytest.raises(OptionError, match="pip install pytetwild"):
+            evened(Surface(sphere(1).points, sphere(1).faces), Recipe(target=600, evening="tetwild"))
