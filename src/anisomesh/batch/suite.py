@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import difflib
-import tomllib
 from dataclasses import dataclass, field
 from importlib import resources
 from pathlib import Path
@@ -11,6 +9,7 @@ from typing import Any
 
 from anisomesh.batch.methods import METHODS
 from anisomesh.errors import OptionError
+from anisomesh.toml import check_keys, hint, parse_toml
 
 _KEYS = {"description", "meshes", "shapes", "closed", "ratios", "seeds", "samples", "methods"}
 _METHOD_KEYS = {"name", "method", "options"}
@@ -83,14 +82,11 @@ def load_suite(name: str) -> Suite:
     elif name.endswith(".toml") and Path(name).is_file():
         text = Path(name).read_text(encoding="utf-8")
     else:
-        hint = _hint(name, shipped_suites())
+        meant = hint(name, shipped_suites())
         raise OptionError(
-            f"there is no suite {name!r}{hint}; expected one of {', '.join(shipped_suites())}, or a .toml file"
+            f"there is no suite {name!r}{meant}; expected one of {', '.join(shipped_suites())}, or a .toml file"
         )
-    try:
-        return parse_suite(Path(name).stem, tomllib.loads(text))
-    except tomllib.TOMLDecodeError as error:
-        raise OptionError(f"{name} is not valid TOML: {error}") from error
+    return parse_suite(Path(name).stem, parse_toml(name, text))
 
 
 def parse_suite(name: str, table: dict[str, Any]) -> Suite:
@@ -101,7 +97,7 @@ def parse_suite(name: str, table: dict[str, Any]) -> Suite:
     OptionError
         If a key or method is unknown, missing, or has a value of the wrong kind.
     """
-    _check_keys(name, table, _KEYS)
+    check_keys(name, table, _KEYS)
     methods = tuple(_method(name, entry) for entry in _list(name, table, "methods", dict))
     if not methods:
         raise OptionError(f"{name}: there is no method; add a [[methods]] table with name and method")
@@ -124,11 +120,11 @@ def parse_suite(name: str, table: dict[str, Any]) -> Suite:
 
 
 def _method(suite: str, entry: dict[str, Any]) -> Method:
-    _check_keys(f"{suite}: method {entry.get('name', '?')!r}", entry, _METHOD_KEYS)
+    check_keys(f"{suite}: method {entry.get('name', '?')!r}", entry, _METHOD_KEYS)
     method = entry.get("method", "")
     if method not in METHODS:
         raise OptionError(
-            f"{suite}: method {method!r} is unknown{_hint(method, list(METHODS))}; expected one of {', '.join(METHODS)}"
+            f"{suite}: method {method!r} is unknown{hint(method, list(METHODS))}; expected one of {', '.join(METHODS)}"
         )
     return Method(name=str(entry.get("name", method)), method=method, options=dict(entry.get("options", {})))
 
@@ -138,14 +134,3 @@ def _list(suite: str, table: dict[str, Any], key: str, kind: Any) -> list[Any]:
     if not isinstance(values, list) or not all(isinstance(value, kind) for value in values):
         raise OptionError(f"{suite}: {key} = {values!r}; expected a list")
     return values
-
-
-def _check_keys(where: str, table: dict[str, Any], known: set[str]) -> None:
-    for key in table:
-        if key not in known:
-            raise OptionError(f"{where}: unknown key {key!r}{_hint(key, sorted(known))}")
-
-
-def _hint(word: str, known: list[str]) -> str:
-    close = difflib.get_close_matches(word, known, 1)
-    return f" (did you mean {close[0]!r}?)" if close else ""

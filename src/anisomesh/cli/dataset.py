@@ -46,9 +46,9 @@ def build_command(
     from anisomesh.dataset.make import VARIANTS, Recipe
 
     recipe = Recipe(target=target, variants=VARIANTS if variants else (), evening=evening.value)
+    sources = sources_of(source, blobs)
     with progress(quiet) as display:
         announce_compilation(display)
-    sources = sources_of(source, blobs)
     on_row = _ignore if quiet else _print
     rows = build(sources, out, recipe, validation=validation, workers=workers, on_row=on_row)
     typer.echo(_summary(rows))

@@ -11,7 +11,7 @@ from typing import Annotated
 
 import typer
 
-from anisomesh.cli import benchmark, dataset, demo, evaluate, figure, info, remesh
+from anisomesh.cli import benchmark, dataset, demo, evaluate, figure, info, remesh, train
 from anisomesh.errors import AnisomeshError
 
 # The base class of all errors in the arguments; it is public only through this subclass.
@@ -30,6 +30,7 @@ app.command("info")(info.command)
 app.command("demo")(demo.command)
 app.command("benchmark")(benchmark.command)
 app.add_typer(dataset.app, name="dataset")
+app.command("train")(train.command)
 
 
 def _print_version(wanted: bool) -> None:

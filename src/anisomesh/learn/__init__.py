@@ -1,1 +1,19 @@
-"""Learning the embedding: what a network is trained on."""
+"""Learning the metric: items, graphs, the network, its training. Only modules of this package import torch."""
+
+from anisomesh.errors import AnisomeshError
+
+
+class LearningError(AnisomeshError):
+    """What learning needs is not installed."""
+
+
+def require_torch() -> None:
+    """Raise LearningError if torch or safetensors is not installed; the message names the extra."""
+    try:
+        import safetensors  # noqa: F401
+        import torch  # noqa: F401
+    except ImportError as error:
+        raise LearningError(
+            f"{error.name} is not installed; the neural embedding and its training need it: "
+            'pip install "anisomesh[learn]"'
+        ) from error

@@ -1,0 +1,97 @@
+"""How a network is trained, from a TOML file."""
+
+from __future__ import annotations
+
+from dataclasses import MISSING, dataclass, field, fields
+from pathlib import Path
+from typing import Any
+
+from anisomesh.errors import OptionError
+from anisomesh.learn.network import NetworkOptions
+from anisomesh.toml import check_keys, read_toml
+
+
+@dataclass(frozen=True, kw_only=True)
+class TrainingOptions:
+    """A training run.
+
+    Attributes
+    ----------
+    data, out
+        Folder of the data set, and of what the run writes.
+    epochs
+        Times that every training item is seen.
+    batch
+        Items whose gradients are averaged for one step.
+    rate, weight_decay, clip
+        Of AdamW: the largest learning rate, reached after ``warmup`` steps and falling to zero along a cosine, the
+        decay of weights, and the norm that gradients are cut to.
+    warmup
+        Steps in which the rate rises.
+    noise, noise_share
+        Largest noise that is added to points, in mean edge lengths, and the share of items that get some.
+    seed
+        Of the weights, the order of the items and the noise.
+    minutes
+        Between checkpoints.
+    network
+        Sizes of the network.
+    """
+
+    data: str
+    out: str
+    epochs: int = 30
+    batch: int = 4
+    rate: float = 2e-3
+    weight_decay: float = 1e-2
+    clip: float = 1.0
+    warmup: int = 100
+    noise: float = 0.5
+    noise_share: float = 0.5
+    seed: int = 0
+    minutes: float = 5.0
+    network: NetworkOptions = field(default_factory=NetworkOptions)
+
+    def __post_init__(self) -> None:
+        for name, low in (("epochs", 1), ("batch", 1), ("warmup", 0), ("seed", 0)):
+            if getattr(self, name) < low:
+                raise OptionError(f"{name} = {getattr(self, name)}; expected at least {low}")
+        for name in ("rate", "clip", "minutes"):
+            if not getattr(self, name) > 0.0:
+                raise OptionError(f"{name} = {getattr(self, name)}; expected a positive number")
+        if not (0.0 <= self.noise_share <= 1.0 and self.noise >= 0.0 and self.weight_decay >= 0.0):
+            raise OptionError("noise and weight_decay must not be negative, and noise_share be between 0 and 1")
+
+
+def load_training(path: str | Path) -> TrainingOptions:
+    """Return the training run that a TOML file describes; its folders are relative to that of the file.
+
+    Raises
+    ------
+    OptionError
+        If the file cannot be read, or a key is unknown, missing, or has a value of the wrong kind.
+    """
+    path = Path(path)
+    table = read_toml(path)
+    network = _values(f"{path}: [network]", NetworkOptions, table.pop("network", {}))
+    values = _values(str(path), TrainingOptions, table)
+    for name in ("data", "out"):
+        values[name] = str(path.parent / values[name])
+    return TrainingOptions(**values, network=NetworkOptions(**network))
+
+
+def _values(where: str, kind: type, table: Any) -> dict[str, Any]:
+    """Return the values of a table, checked against the fields of a dataclass."""
+    if not isinstance(table, dict):
+        raise OptionError(f"{where}: expected a table")
+    known = {entry.name: entry for entry in fields(kind) if entry.name != "network"}
+    check_keys(where, table, known)
+    for name, entry in known.items():
+        if name not in table and entry.default is MISSING and entry.default_factory is MISSING:
+            raise OptionError(f"{where}: {name} is missing")
+        if name not in table:
+            continue
+        wanted: Any = {"int": int, "float": int | float, "str": str}[str(entry.type)]
+        if not isinstance(table[name], wanted) or isinstance(table[name], bool):
+            raise OptionError(f"{where}: {name} = {table[name]!r}; expected {entry.type}")
+    return dict(table)

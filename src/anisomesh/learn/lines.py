@@ -1,0 +1,47 @@
+"""Lines of stretch: what the network predicts, from and to metric tensors, and how far two fields of them are apart."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+import torch
+from torch import Tensor
+
+from anisomesh._arrays import PointTensors, PointVectors
+from anisomesh.metric.tangent import line_field, line_tensors
+
+_ROUND = 0.05  # of the logarithm: errors below it count squared, larger ones in proportion
+MOST = float(np.log(400.0))  # the logarithm of the largest squared stretch
+
+Frames = npt.NDArray[np.float64]
+
+
+def directions_of(tensors: PointTensors) -> tuple[PointVectors, npt.NDArray[np.float64]]:
+    """Return the direction of largest metric (N, 3), and the logarithm of largest over smallest eigenvalue (N,).
+
+    Of the paper's metric, with eigenvalues 1, 1 and r^2, these are v_max and 2 log r.
+    """
+    values, vectors = np.linalg.eigh(tensors)
+    return np.asarray(vectors[:, :, 2]), np.asarray(np.log(values[:, 2] / np.maximum(values[:, 0], 1e-30)))
+
+
+def lines_in(frames: Frames, directions: PointVectors, logarithms: npt.NDArray[np.float64]) -> npt.NDArray[np.float32]:
+    """Return lines (N, 2) in tangent frames (N, 2, 3): the logarithm at twice the angle of the direction."""
+    field = line_field(directions, logarithms, frames)
+    return np.stack([field.real, field.imag], axis=1).astype(np.float32)
+
+
+def tensors_of(lines: npt.NDArray[Any], frames: Frames) -> PointTensors:
+    """Return the paper's metric (N, 3, 3) for lines (N, 2): 1 but for r^2 along the line, r^2 = exp(length)."""
+    field = lines[:, 0].astype(np.float64) + 1j * lines[:, 1].astype(np.float64)
+    square = np.exp(np.minimum(np.abs(field), MOST))
+    return np.asarray(np.eye(3) + (square - 1.0)[:, None, None] * line_tensors(field, frames))
+
+
+def line_loss(predicted: Tensor, wanted: Tensor, weight: Tensor) -> Tensor:
+    """Return the weighted mean distance of lines (N, 2) to those wanted (N, 2), rounded off at zero; weights (N,)."""
+    square = ((predicted - wanted) ** 2).sum(dim=1)
+    distance = torch.sqrt(square + _ROUND**2) - _ROUND
+    return (weight * distance).sum() / torch.clamp(weight.sum(), min=1e-30)

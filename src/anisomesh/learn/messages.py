@@ -1,0 +1,80 @@
+"""The fused neighbour kernel as a function of torch."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import torch
+from torch import Tensor
+from torch.autograd.function import once_differentiable
+
+from anisomesh._kernels.messages import largest_messages, spread_back
+from anisomesh.learn.graph import Graph
+
+
+class _LargestMessages(torch.autograd.Function):
+    """See :func:`largest_of_neighbours`; on the CPU one pass over the edges, with no table of messages."""
+
+    @staticmethod
+    def forward(context: Any, sent: Tensor, weight: Tensor, graph: Graph) -> Tensor:
+        sent, weight = sent.detach().contiguous(), weight.detach().contiguous()
+        largest = torch.empty((graph.n_nodes, sent.shape[1]), dtype=torch.float32)
+        winner = torch.empty(largest.shape, dtype=torch.int32)
+        largest_messages(
+            graph.first, graph.neighbour, sent.numpy(), graph.along, weight.numpy(), largest.numpy(), winner.numpy()
+        )
+        context.graph = graph
+        context.save_for_backward(weight, winner)
+        context.n_sent = len(sent)
+        return largest
+
+    @staticmethod
+    @once_differentiable
+    def backward(context: Any, gradient: Tensor) -> tuple[Tensor, Tensor, None]:
+        weight, winner = context.saved_tensors
+        graph = context.graph
+        to_sent = torch.zeros((context.n_sent, gradient.shape[1]), dtype=torch.float32)
+        to_weight = torch.zeros_like(weight)
+        spread_back(
+            graph.neighbour,
+            graph.along,
+            weight.numpy(),
+            winner.numpy(),
+            gradient.contiguous().numpy(),
+            to_sent.numpy(),
+            to_weight.numpy(),
+        )
+        return to_sent, to_weight, None
+
+
+def largest_of_neighbours(sent: Tensor, weight: Tensor, graph: Graph) -> Tensor:
+    """Return the largest message of the neighbours of each node, channel by channel.
+
+    Parameters
+    ----------
+    sent
+        What each node sends (V, C), float32.
+    weight
+        What the values of an edge add to each channel (K, C).
+    graph
+        The nodes and their edges, with K values each.
+
+    Returns
+    -------
+    Tensor
+        (V, C): max over the edges e from i to j of sent[j] + along[e] weight; 0 for a node without an edge.
+    """
+    if sent.device.type == "cpu":
+        largest: Tensor = _LargestMessages.apply(sent, weight, graph)  # type: ignore[no-untyped-call]
+        return largest
+    return largest_by_scatter(sent, weight, graph)
+
+
+def largest_by_scatter(sent: Tensor, weight: Tensor, graph: Graph) -> Tensor:
+    """Return the same by plain operations of torch, on any device."""
+    edges = graph.edges_on(sent.device)
+    messages = sent[edges.neighbour] + edges.along.to(sent.dtype) @ weight
+    start = messages.new_full((graph.n_nodes, sent.shape[1]), -torch.inf)
+    index = edges.node[:, None].expand_as(messages)
+    largest = start.scatter_reduce(0, index, messages, "amax", include_self=True)
+    return torch.where(torch.isinf(largest), torch.zeros_like(largest), largest)

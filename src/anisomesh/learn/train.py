@@ -1,0 +1,247 @@
+"""Training: epochs of steps, checkpoints, validation, and a list of what was measured."""
+
+from __future__ import annotations
+
+import json
+import math
+import signal
+import time
+from collections.abc import Callable
+from dataclasses import asdict, dataclass
+from pathlib import Path
+from types import FrameType
+from typing import Any
+
+import numpy as np
+import torch
+from torch import Tensor
+
+from anisomesh.errors import OptionError
+from anisomesh.learn.checkpoint import WeightsError, load_state, save_state, save_weights
+from anisomesh.learn.config import TrainingOptions
+from anisomesh.learn.examples import Example, example_of
+from anisomesh.learn.items import load_item
+from anisomesh.learn.lines import line_loss
+from anisomesh.learn.network import StretchNetwork
+from anisomesh.surface.files import atomic_path
+
+CHECKPOINT, WEIGHTS, METRICS = "checkpoint.safetensors", "weights.safetensors", "metrics.jsonl"
+VALIDATION_NOISE = (0.0, 0.3)  # mean edge lengths
+
+Row = dict[str, Any]
+
+
+@dataclass(frozen=True)
+class Files:
+    """Items of a data set for training and for validation."""
+
+    training: list[Path]
+    validation: list[Path]
+
+
+@dataclass
+class _Position:
+    """Where a run is: epochs done, steps done of the next one, the sum of their losses, and the best validation."""
+
+    epoch: int = 0
+    step: int = 0
+    total: float = 0.0
+    best: float = math.inf
+
+
+def train(
+    options: TrainingOptions, files: Files, *, resume: bool = False, on_row: Callable[[Row], None] = lambda row: None
+) -> list[Row]:
+    """Train a network and return what was measured after each epoch.
+
+    Parameters
+    ----------
+    options
+        How.
+    files
+        What on.
+    resume
+        Go on from the checkpoint in the folder of the run; the losses are those of a run that was never interrupted.
+    on_row
+        Called after every epoch with its row.
+
+    Returns
+    -------
+    rows
+        One an epoch, also in ``metrics.jsonl``: ``epoch``, mean training ``loss``, learning ``rate``, ``seconds``, and
+        the losses on validation items at each noise, as a share of those of predicting nothing.
+
+    Raises
+    ------
+    OptionError
+        If there are no items, or the folder has a run and ``resume`` is not given.
+
+    Notes
+    -----
+    The order of items and their noise depend on the seed, the epoch and the step alone, so a checkpoint needs no state
+    of a generator. Checkpoints are written every few minutes, after every epoch, and on SIGTERM and Ctrl-C, which end
+    the run. ``weights.safetensors`` are those of the best epoch on the validation items.
+    """
+    out = Path(options.out)
+    if not files.training or not files.validation:
+        raise OptionError("the data set has no items for training, or none for validation")
+    if (out / CHECKPOINT).exists() and not resume:
+        raise OptionError(f"{out} has a run already; go on with --resume, or name another folder")
+    out.mkdir(parents=True, exist_ok=True)
+    torch.manual_seed(options.seed)
+    network = StretchNetwork(options.network)
+    optimiser = torch.optim.AdamW(network.parameters(), lr=options.rate, weight_decay=options.weight_decay)
+    run = _Run(options, files, network, optimiser, out)
+    if resume:
+        run.load()
+    with _Interruption() as interrupted:
+        while run.at.epoch < options.epochs:
+            row = run.epoch(interrupted)
+            on_row(row)
+    return run.rows()
+
+
+class _Interruption:
+    """Whether SIGTERM or SIGINT has come; until the end of the block they do nothing else."""
+
+    def __init__(self) -> None:
+        self.came = False
+        self._before: dict[int, Any] = {}
+
+    def __enter__(self) -> _Interruption:
+        for number in (signal.SIGTERM, signal.SIGINT):
+            self._before[number] = signal.signal(number, self._note)
+        return self
+
+    def __exit__(self, *error: object) -> None:
+        for number, handler in self._before.items():
+            signal.signal(number, handler)
+
+    def _note(self, number: int, frame: FrameType | None) -> None:
+        self.came = True
+
+
+class _Run:
+    """The state of a run and its files."""
+
+    def __init__(
+        self,
+        options: TrainingOptions,
+        files: Files,
+        network: StretchNetwork,
+        optimiser: torch.optim.Optimizer,
+        out: Path,
+    ) -> None:
+        self.options, self.files, self.network, self.optimiser, self.out = options, files, network, optimiser, out
+        self.at = _Position()
+        self._steps = max(1, math.ceil(len(files.training) / options.batch))
+        self._nothing: dict[float, float] = {}
+
+    def epoch(self, interrupted: _Interruption) -> Row:
+        """Go to the end of the epoch, save what it takes to go on, and return its row."""
+        options, start = self.options, time.monotonic()
+        saved = start
+        order = np.random.default_rng([options.seed, self.at.epoch]).permutation(len(self.files.training))
+        while self.at.step < self._steps:
+            chosen = order[self.at.step * options.batch : (self.at.step + 1) * options.batch]
+            self.at.total += self._step(chosen)
+            self.at.step += 1
+            if interrupted.came or time.monotonic() - saved > 60.0 * options.minutes:
+                self.save()
+                saved = time.monotonic()
+            if interrupted.came:
+                raise KeyboardInterrupt
+        row = {
+            "epoch": self.at.epoch + 1,
+            "loss": self.at.total / self._steps,
+            "rate": self._rate(self.at.epoch * self._steps + self._steps),
+            **self.validate(),
+            "seconds": round(time.monotonic() - start, 1),
+        }
+        score = row[f"validation {VALIDATION_NOISE[0]:g}"] + row[f"validation {VALIDATION_NOISE[-1]:g}"]
+        if score < self.at.best:
+            self.at.best = score
+            facts = {name: row[name] for name in row if name != "seconds"} | {"training": asdict(options)}
+            save_weights(self.network, self.out / WEIGHTS, facts)
+        self.at.epoch, self.at.step, self.at.total = self.at.epoch + 1, 0, 0.0
+        rows = [*self.rows(), row]
+        with atomic_path(self.out / METRICS) as temporary:
+            Path(temporary).write_text("".join(json.dumps(entry) + "\n" for entry in rows), encoding="utf-8")
+        self.save()
+        return row
+
+    def validate(self) -> Row:
+        """Return the mean loss on the validation items at each noise, over that of predicting nothing."""
+        self.network.eval()
+        found = {}
+        with torch.no_grad():
+            for noise in VALIDATION_NOISE:
+                losses, nothing = [], []
+                for number, path in enumerate(self.files.validation):
+                    rng = np.random.default_rng([self.options.seed, number])
+                    example = example_of(load_item(path), self.options.network.scales, noise, rng)
+                    losses.append(float(_loss(self.network, example)))
+                    nothing.append(float(line_loss(torch.zeros_like(example.lines), example.lines, example.weight)))
+                found[f"validation {noise:g}"] = float(np.mean(losses) / max(float(np.mean(nothing)), 1e-30))
+        self.network.train()
+        return found
+
+    def rows(self) -> list[Row]:
+        """Return the rows of the epochs done."""
+        path = self.out / METRICS
+        lines = path.read_text(encoding="utf-8").splitlines() if path.exists() else []
+        return [row for row in map(json.loads, lines) if row["epoch"] <= self.at.epoch]
+
+    def save(self) -> None:
+        """Write the checkpoint."""
+        state = {"at": asdict(self.at), "training": asdict(self.options), "items": self._items()}
+        save_state(self.out / CHECKPOINT, self.network, self.optimiser, state)
+
+    def load(self) -> None:
+        """Go to where the checkpoint is.
+
+        Raises
+        ------
+        WeightsError
+            If it is of another run.
+        """
+        state = load_state(self.out / CHECKPOINT, self.network, self.optimiser)
+        mine = asdict(self.options)
+        other = [
+            name for name, value in state["training"].items() if name not in ("out", "data") and mine.get(name) != value
+        ]
+        if other or state["items"] != self._items():
+            what = f"another {', '.join(other)}" if other else "other items"
+            raise WeightsError(f"{self.out / CHECKPOINT} is of a run with {what}; name another folder")
+        self.at = _Position(**state["at"])
+
+    def _step(self, chosen: np.ndarray[Any, Any]) -> float:
+        """Make one step with these items and return their mean loss."""
+        options = self.options
+        self.optimiser.zero_grad()
+        total = 0.0
+        for number in chosen.tolist():
+            rng = np.random.default_rng([options.seed, self.at.epoch, number])
+            noise = options.noise * rng.random() if rng.random() < options.noise_share else 0.0
+            example = example_of(load_item(self.files.training[number]), options.network.scales, noise, rng)
+            loss = _loss(self.network, example) / len(chosen)
+            loss.backward()  # type: ignore[no-untyped-call]
+            total += float(loss.detach())
+        torch.nn.utils.clip_grad_norm_(self.network.parameters(), options.clip)
+        for group in self.optimiser.param_groups:
+            group["lr"] = self._rate(self.at.epoch * self._steps + self.at.step)
+        self.optimiser.step()
+        return total
+
+    def _rate(self, step: int) -> float:
+        """Return the learning rate at a step of the whole run."""
+        total = max(self.options.epochs * self._steps, 1)
+        rise = min(1.0, (step + 1) / max(self.options.warmup, 1))
+        return self.options.rate * rise * 0.5 * (1.0 + math.cos(math.pi * min(step / total, 1.0)))
+
+    def _items(self) -> list[str]:
+        return sorted(path.name for path in [*self.files.training, *self.files.validation])
+
+
+def _loss(network: StretchNetwork, example: Example) -> Tensor:
+    return line_loss(network(example.pyramid), example.lines, example.weight)

@@ -1,0 +1,54 @@
+"""TOML files read strictly: a key that is not known is an error that names the one that was meant."""
+
+from __future__ import annotations
+
+import difflib
+import tomllib
+from collections.abc import Iterable
+from pathlib import Path
+from typing import Any
+
+from anisomesh.errors import OptionError
+
+
+def parse_toml(name: str, text: str) -> dict[str, Any]:
+    """Return the table in a text.
+
+    Raises
+    ------
+    OptionError
+        If it is no TOML.
+    """
+    try:
+        return tomllib.loads(text)
+    except tomllib.TOMLDecodeError as error:
+        raise OptionError(f"{name} is not valid TOML: {error}") from error
+
+
+def read_toml(path: Path) -> dict[str, Any]:
+    """Return the table in a file.
+
+    Raises
+    ------
+    OptionError
+        If it cannot be read or is no TOML.
+    """
+    try:
+        text = path.read_text(encoding="utf-8")
+    except (OSError, UnicodeDecodeError) as error:
+        raise OptionError(f"{path} cannot be read: {error}") from error
+    return parse_toml(str(path), text)
+
+
+def check_keys(where: str, table: dict[str, Any], known: Iterable[str]) -> None:
+    """Raise OptionError for the first key of a table that is not known."""
+    names = sorted(known)
+    for key in table:
+        if key not in names:
+            raise OptionError(f"{where}: unknown key {key!r}{hint(key, names)}")
+
+
+def hint(word: str, known: Iterable[str]) -> str:
+    """Return a question that names the known word most like this one, nothing if none is."""
+    close = difflib.get_close_matches(word, list(known), 1)
+    return f" (did you mean {close[0]!r}?)" if close else ""
