@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any
@@ -11,6 +12,8 @@ import numpy.typing as npt
 
 from anisomesh.errors import OptionError
 from anisomesh.metric.tensor import METRIC_NAMES, MetricName
+
+EMBEDDINGS = ("direct", "neural")
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -28,7 +31,10 @@ class RemeshOptions:
         ``"curvature"``, ``"approximation"``, ``"uniform"``, or tensors (V, 3, 3) at the points of the input, in
         model units.
     embedding
-        ``"direct"``.
+        ``"direct"``: the metric comes from principal curvatures; ``"neural"``: a trained network predicts it (only for
+        ``metric`` ``"curvature"``).
+    weights
+        File of the trained network, for ``"neural"``.
     seed
         Of the start positions; the same seed and input give the same result.
     threads
@@ -53,6 +59,7 @@ class RemeshOptions:
     final_sharpness: float | None = None
     metric: MetricName | npt.NDArray[Any] = "curvature"
     embedding: str = "direct"
+    weights: str | os.PathLike[str] | None = None
     seed: int = 0
     threads: int = 2
     lloyd_iterations: int = 9
@@ -70,8 +77,12 @@ class RemeshOptions:
                 raise OptionError(f"{name} = {value}; expected a finite number of at least 1 (1 is the plain CVT)")
         if isinstance(self.metric, str) and self.metric not in METRIC_NAMES:
             raise OptionError(f"metric = {self.metric!r}; expected one of {', '.join(METRIC_NAMES)}, or tensors")
-        if self.embedding != "direct":
-            raise OptionError(f"embedding = {self.embedding!r}; expected 'direct'")
+        if self.embedding not in EMBEDDINGS:
+            raise OptionError(f"embedding = {self.embedding!r}; expected one of {', '.join(EMBEDDINGS)}")
+        if (self.embedding == "neural") != (self.weights is not None):
+            raise OptionError("embedding 'neural' and the weights of a trained network have to be given together")
+        if self.embedding == "neural" and not (isinstance(self.metric, str) and self.metric == "curvature"):
+            raise OptionError("embedding 'neural' predicts the curvature metric and takes no other")
         if not 0.0 <= self.feature_angle <= 180.0:
             raise OptionError(f"feature_angle = {self.feature_angle}; expected 0 to 180 degrees")
         if self.time_limit is not None and not self.time_limit > 0.0:

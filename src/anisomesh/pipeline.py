@@ -22,6 +22,7 @@ from anisomesh.dual.refine import Refined, refine
 from anisomesh.embedding.direct import embed
 from anisomesh.errors import MetricError, OptionError, TimeLimitError
 from anisomesh.evaluation.validity import Validity, check_validity
+from anisomesh.learn import require_torch
 from anisomesh.metric.tensor import MetricName, compute_metric
 from anisomesh.options import OnStep, RemeshOptions, StepInfo
 from anisomesh.result import RemeshResult
@@ -139,6 +140,8 @@ def _remesh(
     with run.stage("metric"):
         if not isinstance(wanted, str):
             wanted = split.interpolate(wanted) * frame.scale**2
+        elif options.weights is not None:
+            wanted = _predicted(working, options.weights)
         metric = compute_metric(working, wanted)
     with run.stage("embed"):
         embedding = embed(working, metric.tensors, max_iterations=options.embedding_iterations)
@@ -182,6 +185,14 @@ def _remesh(
         seconds=run.total_seconds(),
         warnings=tuple(_warnings(n, surface, refined, validity, optimised, options)),
     )
+
+
+def _predicted(surface: Surface, weights: str | os.PathLike[str]) -> npt.NDArray[np.float64]:
+    """Return the metric (V, 3, 3) that the network with these weights predicts."""
+    require_torch()
+    from anisomesh.learn.predict import predict_metric
+
+    return predict_metric(surface, weights)
 
 
 def _features(

@@ -32,6 +32,7 @@ class Embedding(StrEnum):
     """How the surface is embedded."""
 
     direct = "direct"
+    neural = "neural"
 
 
 def command(
@@ -57,6 +58,9 @@ def command(
         typer.Option(metavar="FILE", help="Edges to keep: a text file, two vertex numbers a line, the first is 0."),
     ] = None,
     embedding: Annotated[Embedding, typer.Option(help="How the surface is embedded.")] = Embedding.direct,
+    weights: Annotated[
+        Path | None, typer.Option(metavar="FILE", help="Trained network, for --embedding neural.")
+    ] = None,
     seed: Seed = 0,
     threads: Threads = 2,
     time_limit: Annotated[
@@ -80,7 +84,8 @@ def command(
     outputs = Outputs(mesh=out, report=report, rvd=rvd, picture=picture)
     outputs.check()
     options = remesh_options(metric, sharpness, final_sharpness, seed, threads)
-    options |= {"embedding": embedding.value, "feature_angle": feature_angle, "time_limit": time_limit}
+    options |= {"embedding": embedding.value, "weights": None if weights is None else str(weights)}
+    options |= {"feature_angle": feature_angle, "time_limit": time_limit}
     with progress(quiet) as display:
         surface, seconds = read(source)
         if features is not None:

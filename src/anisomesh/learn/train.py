@@ -6,7 +6,8 @@ import json
 import math
 import signal
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
 from dataclasses import asdict, dataclass
 from pathlib import Path
 from types import FrameType
@@ -94,11 +95,22 @@ def train(
     run = _Run(options, files, network, optimiser, out)
     if resume:
         run.load()
-    with _Interruption() as interrupted:
+    with _Interruption() as interrupted, _deterministic():
         while run.at.epoch < options.epochs:
             row = run.epoch(interrupted)
             on_row(row)
     return run.rows()
+
+
+@contextmanager
+def _deterministic() -> Iterator[None]:
+    """Have torch take sums in the same order every time, for any number of threads, until the end of the block."""
+    before = torch.are_deterministic_algorithms_enabled()
+    torch.use_deterministic_algorithms(True)
+    try:
+        yield
+    finally:
+        torch.use_deterministic_algorithms(before)
 
 
 class _Interruption:

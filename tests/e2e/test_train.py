@@ -1,0 +1,213 @@
+"""Training: the same losses after a stop and a resume, files that belong together, configurations that are wrong."""
+
+import json
+import os
+import signal
+import subprocess
+import sys
+import time
+
+import numpy as np
+import pytest
+
+torch = pytest.importorskip("torch")
+
+import anisomesh  # noqa: E402
+from anisomesh.dataset.implicit import Blobs  # noqa: E402
+from anisomesh.dataset.make import Recipe, items_of_blobs  # noqa: E402
+from anisomesh.errors import OptionError  # noqa: E402
+from anisomesh.learn.checkpoint import WeightsError, load_weights  # noqa: E402
+from anisomesh.learn.config import TrainingOptions, load_training  # noqa: E402
+from anisomesh.learn.items import load_item, save_item  # noqa: E402
+from anisomesh.learn.network import NetworkOptions  # noqa: E402
+from anisomesh.learn.predict import predict_metric  # noqa: E402
+from anisomesh.learn.train import CHECKPOINT, METRICS, WEIGHTS, Files, train  # noqa: E402
+
+NETWORK = NetworkOptions(channels=16, scales=3, blocks=1, heads=2)
+
+
+@pytest.fixture(scope="module")
+def files(tmp_path_factory):
+    folder = tmp_path_factory.mktemp("items")
+    paths = []
+    for seed in range(2):
+        made = items_of_blobs(
+            Blobs.random(np.random.default_rng(seed)), Recipe(target=300), np.random.default_rng(seed)
+        )
+        for entry in made:
+            paths.append(folder / f"blobs-{seed}.{entry.kind}.npz")
+            save_item(entry.item, paths[-1])
+    rows = [
+        {"name": f"blobs-{seed}", "family": str(seed), "split": split, "fingerprint": "", "status": "kept"}
+        | {"items": [{"file": path.name, "kind": path.name.split(".")[1]} for path in paths[3 * seed : 3 * seed + 3]]}
+        for seed, split in enumerate(("training", "validation"))
+    ]
+    (folder / "manifest.jsonl").write_text("".join(json.dumps(row) + "\n" for row in rows))
+    return Files(training=paths[:3], validation=paths[3:])
+
+
+def options(folder, **changes):
+    return TrainingOptions(
+        **{"data": "", "out": str(folder), "epochs": 4, "batch": 2, "warmup": 2, "network": NETWORK} | changes
+    )
+
+
+def losses(rows):
+    return [{name: value for name, value in row.items() if name != "seconds"} for row in rows]
+
+
+def weights(folder):
+    return load_weights(folder / WEIGHTS)[0].state_dict()
+
+
+def test_a_run_learns_and_writes_its_files(files, tmp_path):
+    rows = train(options(tmp_path / "run", epochs=12, rate=1e-2), files)
+    assert [row["epoch"] for row in rows] == list(range(1, 13))
+    assert rows[-1]["loss"] < 0.8 * rows[0]["loss"]
+    lines = (tmp_path / "run" / METRICS).read_text().splitlines()
+    assert [json.loads(line) for line in lines] == rows
+    network, facts = load_weights(tmp_path / "run" / WEIGHTS)
+    assert network.options == NETWORK
+    assert facts["training"]["epochs"] == 12
+    best = min(rows, key=lambda row: row["validation 0"] + row["validation 0.3"])
+    assert facts["epoch"] == best["epoch"]
+
+
+@pytest.mark.parametrize("stop_after", [1, 2, 3])
+def test_a_run_that_was_stopped_goes_on_as_if_it_had_not_been(files, tmp_path, stop_after):
+    whole = train(options(tmp_path / "whole"), files)
+
+    def stop(row):
+        if row["epoch"] == stop_after:
+            os.kill(os.getpid(), signal.SIGTERM)  # seen after the next step, in the middle of an epoch
+
+    with pytest.raises(KeyboardInterrupt):
+        train(options(tmp_path / "cut"), files, on_row=stop)
+    seen = []
+    rest = train(options(tmp_path / "cut"), files, resume=True, on_row=seen.append)
+    assert losses(rest) == losses(whole)
+    assert [row["epoch"] for row in seen] == list(range(stop_after + 1, 5))
+    for name, value in weights(tmp_path / "whole").items():
+        torch.testing.assert_close(weights(tmp_path / "cut")[name], value, rtol=0, atol=0)
+
+
+def test_handlers_of_signals_are_as_before(files, tmp_path):
+    before = signal.getsignal(signal.SIGTERM), signal.getsignal(signal.SIGINT)
+    train(options(tmp_path / "run", epochs=1), files)
+    assert (signal.getsignal(signal.SIGTERM), signal.getsignal(signal.SIGINT)) == before
+
+
+def test_a_run_is_not_overwritten_and_not_mixed_with_another(files, tmp_path):
+    train(options(tmp_path / "run", epochs=1), files)
+    with pytest.raises(OptionError, match="--resume"):
+        train(options(tmp_path / "run", epochs=1), files)
+    with pytest.raises(WeightsError, match="another rate"):
+        train(options(tmp_path / "run", epochs=1, rate=1e-4), files, resume=True)
+    fewer = Files(training=files.training[:2], validation=files.validation)
+    with pytest.raises(WeightsError, match="other items"):
+        train(options(tmp_path / "run", epochs=1), fewer, resume=True)
+    with pytest.raises(OptionError, match="no items"):
+        train(options(tmp_path / "none"), Files(training=[], validation=[]))
+    path = tmp_path / "run" / CHECKPOINT
+    path.write_bytes(path.read_bytes()[:1000])
+    with pytest.raises(WeightsError, match="safetensors"):
+        train(options(tmp_path / "run", epochs=1), files, resume=True)
+
+
+@pytest.mark.parametrize("data", [b"", b"hello there", b"\xff" * 100, (10**9).to_bytes(8, "little") + b"{}"])
+def test_files_that_are_no_weights_are_refused(tmp_path, data):
+    (tmp_path / "a.safetensors").write_bytes(data)
+    for path in (tmp_path / "a.safetensors", tmp_path / "none.safetensors"):
+        with pytest.raises(WeightsError, match=r"\.safetensors: cannot be read"):
+            load_weights(path)
+
+
+CONFIG = (
+    'data = "items"\nout = "run"\nepochs = 2\nbatch = 2\n[network]\nchannels = 16\nscales = 3\nblocks = 1\nheads = 2\n'
+)
+
+
+@pytest.mark.parametrize(
+    ("text", "words"),
+    [
+        (CONFIG.replace("epochs", "epoch"), r"unknown key 'epoch' \(did you mean 'epochs'"),
+        (CONFIG.replace("channels", "chanels"), r"network.*unknown key 'chanels' \(did you mean 'channels'"),
+        (CONFIG.replace("epochs = 2", "epochs = 0"), "epochs = 0; expected at least 1"),
+        (CONFIG.replace("epochs = 2", 'epochs = "two"'), "epochs = 'two'; expected int"),
+        (CONFIG.replace('out = "run"', ""), "out is missing"),
+        ("network = 3\n" + CONFIG.split("[network]")[0], "expected a table"),
+        ("nonsense", "not valid TOML"),
+    ],
+)
+def test_wrong_configurations_say_what_is_meant(tmp_path, text, words):
+    (tmp_path / "a.toml").write_text(text)
+    with pytest.raises(OptionError, match=words):
+        load_training(tmp_path / "a.toml")
+    with pytest.raises(OptionError, match="cannot be read"):
+        load_training(tmp_path / "none.toml")
+
+
+def test_folders_of_a_configuration_are_relative_to_its_file(tmp_path):
+    (tmp_path / "a.toml").write_text(CONFIG)
+    loaded = load_training(tmp_path / "a.toml")
+    assert (loaded.data, loaded.out) == (str(tmp_path / "items"), str(tmp_path / "run"))
+    assert loaded.network == NETWORK
+
+
+def test_the_command_trains_stops_and_resumes(files, tmp_path, run_cli):
+    (tmp_path / "a.toml").write_text(
+        CONFIG.replace('"items"', f'"{files.training[0].parent}"').replace("epochs = 2", "epochs = 60")
+    )
+    command = [sys.executable, "-c", "from anisomesh.cli.main import run; run()", "train", "a.toml"]
+    process = subprocess.Popen(command, cwd=tmp_path, stderr=subprocess.DEVNULL)
+    deadline = time.monotonic() + 60
+    while not (tmp_path / "run" / METRICS).exists() and time.monotonic() < deadline:
+        time.sleep(0.05)
+    process.send_signal(signal.SIGTERM)
+    assert process.wait(60) == 130
+    before = len((tmp_path / "run" / METRICS).read_text().splitlines())
+    assert 1 <= before < 60
+    assert run_cli("train", "a.toml", cwd=tmp_path).returncode == 1
+    done = run_cli("train", "a.toml", "--resume", cwd=tmp_path)
+    assert done.returncode == 0, done.stderr
+    assert done.stdout.startswith("60 epochs; wrote")
+    assert f"epoch {before + 1}:" in done.stderr
+    assert f"epoch {before}:" not in done.stderr
+
+
+def test_a_remesh_takes_the_metric_of_a_trained_network(files, tmp_path, run_cli):
+    surface = load_item(files.validation[0]).surface
+    train(options(tmp_path / "run", epochs=12, rate=1e-2), files)
+    weights = tmp_path / "run" / WEIGHTS
+    result = anisomesh.remesh(surface, n_vertices=150, embedding="neural", weights=weights, max_iterations=20)
+    assert result.surface.n_points == 150
+    wanted = predict_metric(result.working, weights)
+    stretch = np.sqrt(np.linalg.eigvalsh(wanted)[:, 2])
+    assert stretch.mean() > 1.1
+    assert result.embedding.stretch.asked_mean == pytest.approx(stretch.mean(), rel=0.1)
+    anisomesh.save(surface, tmp_path / "in.ply")
+    words = ("remesh", tmp_path / "in.ply", "-o", tmp_path / "out.ply", "-n", 100, "--embedding", "neural")
+    done = run_cli(*words, "--weights", weights)
+    assert done.returncode == 0, done.stderr
+    assert anisomesh.load(tmp_path / "out.ply").n_points == 100
+    for more, said in (((), "weights of a trained network"), (("--weights", tmp_path / "in.ply"), "safetensors")):
+        done = run_cli(*words, *more)
+        assert done.returncode == 1
+        assert said in done.stderr.strip().splitlines()[-1]
+    with pytest.raises(OptionError, match="takes no other"):
+        anisomesh.remesh(surface, n_vertices=150, embedding="neural", weights=weights, metric="uniform")
+
+
+def test_without_torch_the_error_names_the_extra(tmp_path, torus_obj):
+    code = (
+        "import sys; sys.modules['torch'] = None\n"
+        "import anisomesh; from anisomesh.errors import AnisomeshError\n"
+        f"s = anisomesh.load({str(torus_obj)!r})\n"
+        "print(anisomesh.remesh(s, n_vertices=50, max_iterations=2).surface.n_points)\n"
+        "try: anisomesh.remesh(s, n_vertices=50, embedding='neural', weights='x')\n"
+        "except AnisomeshError as error: print(error)\n"
+    )
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
+    first, second = done.stdout.strip().splitlines()
+    assert first == "50"
+    assert 'pip install "anisomesh[learn]"' in second

@@ -1,0 +1,139 @@
+"""The network: what it sees does not change under motion, its lines turn with the mesh, and it learns."""
+
+import numpy as np
+import pytest
+
+torch = pytest.importorskip("torch")
+
+from anisomesh.learn.examples import example_of  # noqa: E402
+from anisomesh.learn.items import Item  # noqa: E402
+from anisomesh.learn.lines import MOST, directions_of, line_loss, lines_in, tensors_of  # noqa: E402
+from anisomesh.learn.network import NetworkOptions, StretchNetwork  # noqa: E402
+from anisomesh.learn.pyramid import N_EDGE, N_NODE, pyramid  # noqa: E402
+from anisomesh.metric.curvature import principal_curvatures  # noqa: E402
+from anisomesh.metric.tangent import tangent_frames  # noqa: E402
+from anisomesh.metric.tensor import curvature_metric  # noqa: E402
+from anisomesh.surface.mesh import Surface  # noqa: E402
+from anisomesh.surface.shapes import ellipsoid, open_patch, sphere, torus  # noqa: E402
+
+SMALL = NetworkOptions(channels=16, scales=3, blocks=1, heads=2)
+
+
+def shaken(surface, seed=0):
+    rng = np.random.default_rng(seed)
+    points = surface.points + rng.normal(0.0, 0.05 * surface.edge_lengths.mean(), surface.points.shape)
+    surface = surface.with_points(points)
+    return surface.with_points(points / surface.diagonal)
+
+
+def moved(surface, seed=1):
+    """Return the surface with its points in another order and turned, that order, and the turn."""
+    rng = np.random.default_rng(seed)
+    order = rng.permutation(surface.n_points)
+    turn = np.linalg.qr(rng.normal(size=(3, 3)))[0]
+    turn *= np.sign(np.linalg.det(turn))
+    faces = np.argsort(order)[surface.faces][rng.permutation(surface.n_faces)]
+    return Surface(surface.points[order] @ turn.T, faces), order, turn
+
+
+def predicted(network, surface):
+    seen = pyramid(surface, network.options.scales)
+    with torch.no_grad():
+        return tensors_of(network(seen).numpy(), seen.frames)
+
+
+def egg_item():
+    surface = ellipsoid((1.0, 0.6, 0.3), 3)
+    surface = surface.with_points(surface.points / surface.diagonal)
+    curvature = principal_curvatures(surface)
+    tensors = curvature_metric(surface, curvature)
+    return Item.of(surface, tensors, np.zeros((surface.n_points, 5)), curvature.trusted)
+
+
+@pytest.mark.parametrize("seed", range(3))
+def test_lines_come_back_from_tensors_and_tensors_from_lines(seed):
+    rng = np.random.default_rng(seed)
+    normals = rng.normal(size=(50, 3))
+    frames = tangent_frames(normals / np.linalg.norm(normals, axis=1, keepdims=True))
+    lines = rng.normal(size=(50, 2))
+    tensors = tensors_of(lines, frames)
+    values = np.linalg.eigvalsh(tensors)
+    np.testing.assert_allclose(values[:, :2], 1.0, atol=1e-9)
+    np.testing.assert_allclose(np.log(values[:, 2]), np.hypot(*lines.T), atol=1e-9)
+    np.testing.assert_allclose(lines_in(frames, *directions_of(tensors)), lines, atol=1e-5)
+    assert np.linalg.eigvalsh(tensors_of(100.0 * lines, frames)).max() <= np.exp(MOST) * (1 + 1e-9)
+
+
+def test_the_loss_is_zero_for_the_answer_and_a_distance_elsewhere():
+    wanted = torch.tensor([[3.0, 4.0], [0.0, 0.0], [1.0, 0.0]])
+    weight = torch.tensor([1.0, 1.0, 0.0])
+    assert float(line_loss(wanted, wanted, weight)) == pytest.approx(0.0, abs=1e-6)
+    assert float(line_loss(torch.zeros(3, 2), wanted, weight)) == pytest.approx(0.5 * 5.0, abs=0.03)
+    assert float(line_loss(wanted + torch.tensor([[0, 0], [0, 0], [9.0, 0]]), wanted, weight)) < 1e-6
+
+
+@pytest.mark.parametrize("surface", [sphere(3), torus(n_major=40, n_minor=16)])
+def test_values_of_nodes_and_edges_are_those_of_the_shape(surface):
+    surface = surface.with_points(surface.points / surface.diagonal)
+    finest = pyramid(surface, 3).scales[0]
+    assert finest.nodes.shape == (surface.n_points, N_NODE)
+    assert finest.graph.along.shape == (2 * len(surface.edges), N_EDGE)
+    if surface.n_points == sphere(3).n_points:
+        radius = 1.0 / (2.0 * np.sqrt(3.0))
+        np.testing.assert_allclose(finest.graph.along[:, 1:], np.arcsinh(1.0 / radius), rtol=0.1)
+        assert np.median(finest.graph.along[:, 1]) == pytest.approx(np.arcsinh(1.0 / radius), rel=0.01)
+    length = np.linalg.norm(finest.turns, axis=1)
+    np.testing.assert_allclose(length, 1.0, atol=1e-6)
+
+
+def test_what_the_network_sees_does_not_change_with_order_or_motion():
+    surface = shaken(torus(n_major=40, n_minor=16))
+    other, order, _ = moved(surface)
+    mine, theirs = pyramid(surface, 3), pyramid(other, 3)
+    np.testing.assert_allclose(theirs.scales[0].nodes, mine.scales[0].nodes[order], atol=1e-4)
+    for a, b in zip(mine.scales, theirs.scales, strict=True):
+        assert len(a.nodes) == len(b.nodes)
+        np.testing.assert_allclose(np.sort(a.nodes, axis=0), np.sort(b.nodes, axis=0), atol=1e-4)
+
+
+@pytest.mark.parametrize("surface", [torus(n_major=40, n_minor=16), open_patch(lambda x, y: 0.3 * x * y, n=15)])
+def test_the_metric_turns_with_the_mesh_and_ignores_the_order(surface):
+    torch.manual_seed(0)
+    network = StretchNetwork(SMALL).eval()
+    for block in network.modules():
+        if hasattr(block, "out") and isinstance(block.out, torch.nn.Linear):
+            torch.nn.init.normal_(block.out.weight, std=0.1)
+    surface = shaken(surface)
+    other, order, turn = moved(surface)
+    mine, theirs = predicted(network, surface), predicted(network, other)
+    assert np.ptp(np.linalg.eigvalsh(mine)[:, 2]) > 0.1
+    np.testing.assert_allclose(theirs, turn @ mine[order] @ turn.T, rtol=1e-3, atol=1e-3)
+
+
+def test_noise_moves_the_mesh_and_not_the_lines_wanted():
+    item = egg_item()
+    clean, noisy = example_of(item, 3), example_of(item, 3, 0.3, np.random.default_rng(0))
+    assert np.abs(clean.pyramid.scales[0].nodes - noisy.pyramid.scales[0].nodes).max() > 0.1
+    length = [torch.linalg.norm(example.lines, dim=1) for example in (clean, noisy)]
+    torch.testing.assert_close(*length, atol=1e-4, rtol=1e-4)
+    assert float(clean.weight.sum()) == pytest.approx(1.0)
+    tensors = [tensors_of(example.lines.numpy(), example.pyramid.frames) for example in (clean, noisy)]
+    cosine = np.einsum("nx,nx->n", *(directions_of(t)[0] for t in tensors))
+    stretched = length[0].numpy() > 0.3
+    assert np.median(np.abs(cosine[stretched])) > 0.95
+    again = example_of(item, 3, 0.3, np.random.default_rng(0))
+    torch.testing.assert_close(again.lines, noisy.lines)
+
+
+def test_a_network_learns_one_shape():
+    torch.manual_seed(0)
+    network = StretchNetwork(SMALL)
+    example = example_of(egg_item(), SMALL.scales)
+    nothing = float(line_loss(torch.zeros_like(example.lines), example.lines, example.weight))
+    optimiser = torch.optim.AdamW(network.parameters(), lr=5e-3)
+    for _ in range(60):
+        optimiser.zero_grad()
+        loss = line_loss(network(example.pyramid), example.lines, example.weight)
+        loss.backward()
+        optimiser.step()
+    assert float(loss.detach()) < 0.25 * nothing
