@@ -7,7 +7,7 @@ from dataclasses import replace
 from math import exp, log
 
 from anisomesh.clock import Clock
-from anisomesh.errors import OptionError
+from anisomesh.errors import OptionError, TimeLimitError
 from anisomesh.evaluation.distance import surface_distance
 from anisomesh.result import RemeshResult
 from anisomesh.surface.mesh import Surface
@@ -40,6 +40,8 @@ def smallest_within(
     ------
     OptionError
         If not even four times as many vertices as the surface has do.
+    TimeLimitError
+        If the limit is over before any result does.
     """
     results: dict[int, RemeshResult] = {}
 
@@ -53,7 +55,13 @@ def smallest_within(
 
     most = MOST_RATIO * surface.n_points + MOST_MORE
     first = max(MIN_VERTICES, round(FIRST_RATIO * surface.n_points))
-    n, error = smallest_count(error_at, max_error, first, MIN_VERTICES, most, stop=clock.over)
+    try:
+        n, error = smallest_count(error_at, max_error, first, MIN_VERTICES, most, stop=clock.over)
+    except TimeLimitError:
+        if not results:
+            raise
+        found = next(iter(results.values()))
+        return replace(found, warnings=(*found.warnings, "the time limit ended the search for fewer vertices"))
     if n not in results:
         raise OptionError(
             f"max_error = {max_error:g} is not reached: with {n:,} vertices the distance is {error:g}; allow more"

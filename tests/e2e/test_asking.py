@@ -7,8 +7,10 @@ import pytest
 from edge_distance import distance_to_edges
 
 import anisomesh
+from anisomesh.clock import Clock
 from anisomesh.errors import AnisomeshError, OptionError, TimeLimitError
 from anisomesh.evaluation.distance import surface_distance
+from anisomesh.search import smallest_within
 from anisomesh.surface import topology
 from anisomesh.surface.features import points_along
 from anisomesh.surface.mesh import Surface
@@ -167,6 +169,24 @@ def test_a_time_limit_that_leaves_nothing_is_an_error(run_cli, tmp_path, torus_o
     assert done.returncode == 1
     assert not (tmp_path / "out.ply").exists()
     assert "time limit" in done.stderr.strip().splitlines()[-1]
+
+
+def test_a_time_limit_ends_the_search_with_the_best_result_so_far():
+    surface, tried = ellipsoid((2.0, 1.0, 0.5), 3), []
+
+    def run(n):
+        tried.append(n)
+        if len(tried) == 3:
+            raise TimeLimitError("over")
+        return anisomesh.remesh(surface, n_vertices=n, max_iterations=5)
+
+    result = smallest_within(run, surface, 0.2, Clock())
+    assert result.surface.n_points == min(tried[:2])
+    assert result.distance <= 0.2
+    assert "the time limit ended the search" in result.warnings[-1]
+    tried[:] = [0, 0]
+    with pytest.raises(TimeLimitError):
+        smallest_within(run, surface, 0.2, Clock())
 
 
 def test_one_of_the_ways_to_ask_is_wanted():
