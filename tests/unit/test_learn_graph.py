@@ -51,9 +51,10 @@ def test_largest_messages_are_those_of_brute_force(seed):
 def test_derivatives_of_the_kernel_are_those_of_plain_torch():
     graph = random_graph(seed=4)
     sent, weight = torch.randn(40, 7, requires_grad=True), torch.randn(3, 7, requires_grad=True)
-    towards = torch.randn(40, 7)
-    mine = torch.autograd.grad(largest_of_neighbours(sent, weight, graph), (sent, weight), towards)
-    theirs = torch.autograd.grad(largest_by_scatter(sent, weight, graph), (sent, weight), towards)
+    along = torch.randn(graph.along.shape, requires_grad=True)
+    towards, inputs = torch.randn(40, 7), (sent, weight, along)
+    mine = torch.autograd.grad(largest_of_neighbours(sent, weight, graph, along), inputs, towards)
+    theirs = torch.autograd.grad(largest_by_scatter(sent, weight, graph, along), inputs, towards)
     for a, b in zip(mine, theirs, strict=True):
         torch.testing.assert_close(a, b)
     assert all(grad.abs().sum() > 0 for grad in mine)

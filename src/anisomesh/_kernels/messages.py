@@ -56,9 +56,16 @@ def largest_messages(
 
 @kernel
 def spread_back(
-    neighbour: Ints, along: Floats, weight: Floats, winner: Ints, gradient: Floats, to_sent: Floats, to_weight: Floats
+    neighbour: Ints,
+    along: Floats,
+    weight: Floats,
+    winner: Ints,
+    gradient: Floats,
+    to_sent: Floats,
+    to_along: Floats,
+    to_weight: Floats,
 ) -> None:
-    """Add the derivatives of :func:`largest_messages` to ``to_sent`` (V, C) and ``to_weight`` (K, C).
+    """Add the derivatives of :func:`largest_messages` to ``to_sent`` (V, C), ``to_along`` (E, K), ``to_weight`` (K, C).
 
     Parameters
     ----------
@@ -75,3 +82,4 @@ def spread_back(
                 to_sent[neighbour[e], c] += g
                 for k in range(along.shape[1]):
                     to_weight[k, c] += g * along[e, k]
+                    to_along[e, k] += g * weight[k, c]

@@ -16,38 +16,29 @@ class _LargestMessages(torch.autograd.Function):
     """See :func:`largest_of_neighbours`; on the CPU one pass over the edges, with no table of messages."""
 
     @staticmethod
-    def forward(context: Any, sent: Tensor, weight: Tensor, graph: Graph) -> Tensor:
-        sent, weight = sent.detach().contiguous(), weight.detach().contiguous()
+    def forward(context: Any, sent: Tensor, along: Tensor, weight: Tensor, graph: Graph) -> Tensor:
+        sent, along, weight = (value.detach().contiguous() for value in (sent, along, weight))
         largest = torch.empty((graph.n_nodes, sent.shape[1]), dtype=torch.float32)
         winner = torch.empty(largest.shape, dtype=torch.int32)
-        largest_messages(
-            graph.first, graph.neighbour, sent.numpy(), graph.along, weight.numpy(), largest.numpy(), winner.numpy()
-        )
+        arrays = (value.numpy() for value in (sent, along, weight, largest, winner))
+        largest_messages(graph.first, graph.neighbour, *arrays)
         context.graph = graph
-        context.save_for_backward(weight, winner)
+        context.save_for_backward(along, weight, winner)
         context.n_sent = len(sent)
         return largest
 
     @staticmethod
     @once_differentiable
-    def backward(context: Any, gradient: Tensor) -> tuple[Tensor, Tensor, None]:
-        weight, winner = context.saved_tensors
-        graph = context.graph
+    def backward(context: Any, gradient: Tensor) -> tuple[Tensor, Tensor, Tensor, None]:
+        along, weight, winner = context.saved_tensors
         to_sent = torch.zeros((context.n_sent, gradient.shape[1]), dtype=torch.float32)
-        to_weight = torch.zeros_like(weight)
-        spread_back(
-            graph.neighbour,
-            graph.along,
-            weight.numpy(),
-            winner.numpy(),
-            gradient.contiguous().numpy(),
-            to_sent.numpy(),
-            to_weight.numpy(),
-        )
-        return to_sent, to_weight, None
+        to_along, to_weight = torch.zeros_like(along), torch.zeros_like(weight)
+        values = (along, weight, winner, gradient.contiguous(), to_sent, to_along, to_weight)
+        spread_back(context.graph.neighbour, *(value.numpy() for value in values))
+        return to_sent, to_along, to_weight, None
 
 
-def largest_of_neighbours(sent: Tensor, weight: Tensor, graph: Graph) -> Tensor:
+def largest_of_neighbours(sent: Tensor, weight: Tensor, graph: Graph, along: Tensor | None = None) -> Tensor:
     """Return the largest message of the neighbours of each node, channel by channel.
 
     Parameters
@@ -58,22 +49,25 @@ def largest_of_neighbours(sent: Tensor, weight: Tensor, graph: Graph) -> Tensor:
         What the values of an edge add to each channel (K, C).
     graph
         The nodes and their edges, with K values each.
+    along
+        Other values of the edges (E, K) in place of those.
 
     Returns
     -------
     Tensor
         (V, C): max over the edges e from i to j of sent[j] + along[e] weight; 0 for a node without an edge.
     """
+    along = graph.edges_on(sent.device).along if along is None else along
     if sent.device.type == "cpu":
-        largest: Tensor = _LargestMessages.apply(sent, weight, graph)  # type: ignore[no-untyped-call]
+        largest: Tensor = _LargestMessages.apply(sent, along, weight, graph)  # type: ignore[no-untyped-call]
         return largest
-    return largest_by_scatter(sent, weight, graph)
+    return largest_by_scatter(sent, weight, graph, along)
 
 
-def largest_by_scatter(sent: Tensor, weight: Tensor, graph: Graph) -> Tensor:
+def largest_by_scatter(sent: Tensor, weight: Tensor, graph: Graph, along: Tensor | None = None) -> Tensor:
     """Return the same by plain operations of torch, on any device."""
     edges = graph.edges_on(sent.device)
-    messages = sent[edges.neighbour] + edges.along.to(sent.dtype) @ weight
+    messages = sent[edges.neighbour] + (edges.along if along is None else along) @ weight
     start = messages.new_full((graph.n_nodes, sent.shape[1]), -torch.inf)
     index = edges.node[:, None].expand_as(messages)
     largest = start.scatter_reduce(0, index, messages, "amax", include_self=True)

@@ -1,6 +1,6 @@
 """Creases and corners at a fifth of the vertices: ten parts made by code and the CAD meshes of the test folder.
 
-Usage: python benchmarks/creases.py [--ratio 0.2] [--folder test] [--only NAME]
+Usage: python benchmarks/crease_coverage.py [--ratio 0.2] [--folder test] [--only NAME]
 
 Parts made by code have their long edges split first, to some 2,000 vertices. The meshes of the folder come from
 ``ANISOMESH_DATA``. Exit code 1 if a corner is missed or less than 99 % of the creases covered.
