@@ -6,6 +6,7 @@ import signal
 import subprocess
 import sys
 import time
+from functools import partial
 
 import numpy as np
 import pytest
@@ -20,9 +21,11 @@ from anisomesh.learn.checkpoint import WeightsError, load_weights  # noqa: E402
 from anisomesh.learn.config import TrainingOptions, load_training  # noqa: E402
 from anisomesh.learn.items import load_item, save_item  # noqa: E402
 from anisomesh.learn.network import NetworkOptions  # noqa: E402
+from anisomesh.learn.paper import PaperOptions  # noqa: E402
 from anisomesh.learn.predict import predict_metric  # noqa: E402
 from anisomesh.learn.train import CHECKPOINT, METRICS, WEIGHTS, Files, train  # noqa: E402
 
+PAPER = PaperOptions(channels=8, levels=2)
 NETWORK = NetworkOptions(channels=16, scales=3, blocks=1, heads=2)
 
 
@@ -46,10 +49,13 @@ def files(tmp_path_factory):
     return Files(training=paths[:3], validation=paths[3:])
 
 
-def options(folder, **changes):
+def options_with(folder, **changes):
     return TrainingOptions(
         **{"data": "", "out": str(folder), "epochs": 4, "batch": 2, "warmup": 2, "network": NETWORK} | changes
     )
+
+
+options = options_with
 
 
 def losses(rows):
@@ -73,8 +79,9 @@ def test_a_run_learns_and_writes_its_files(files, tmp_path):
     assert facts["epoch"] == best["epoch"]
 
 
-@pytest.mark.parametrize("stop_after", [1, 2, 3])
-def test_a_run_that_was_stopped_goes_on_as_if_it_had_not_been(files, tmp_path, stop_after):
+@pytest.mark.parametrize(("stop_after", "network"), [(1, NETWORK), (2, NETWORK), (3, NETWORK), (2, PAPER)])
+def test_a_run_that_was_stopped_goes_on_as_if_it_had_not_been(files, tmp_path, stop_after, network):
+    options = partial(options_with, network=network)
     whole = train(options(tmp_path / "whole"), files)
 
     def stop(row):
@@ -137,6 +144,10 @@ CONFIG = (
         (CONFIG.replace('out = "run"', ""), "out is missing"),
         ("network = 3\n" + CONFIG.split("[network]")[0], "expected a table"),
         ("nonsense", "not valid TOML"),
+        (CONFIG + "[paper]\nchannels = 8\n", "either"),
+        (CONFIG.replace("epochs", 'loss = "l3"\nepochs'), "loss = 'l3'; expected one of dot, l2, cosine"),
+        (CONFIG.replace("epochs", 'gauge = "round"\nepochs'), "gauge = 'round'; expected one of aligned, raw"),
+        (CONFIG.replace("epochs", "augment = 1\nepochs"), "augment = 1; expected bool"),
     ],
 )
 def test_wrong_configurations_say_what_is_meant(tmp_path, text, words):
@@ -152,6 +163,9 @@ def test_folders_of_a_configuration_are_relative_to_its_file(tmp_path):
     loaded = load_training(tmp_path / "a.toml")
     assert (loaded.data, loaded.out) == (str(tmp_path / "items"), str(tmp_path / "run"))
     assert loaded.network == NETWORK
+    sizes = CONFIG.split("[network]")[0] + "[paper]\nchannels = 8\nlevels = 2\n"
+    (tmp_path / "a.toml").write_text(sizes)
+    assert load_training(tmp_path / "a.toml").network == PAPER
 
 
 def test_the_command_trains_stops_and_resumes(files, tmp_path, run_cli):
@@ -211,3 +225,13 @@ def test_without_torch_the_error_names_the_extra(tmp_path, torus_obj):
     first, second = done.stdout.strip().splitlines()
     assert first == "50"
     assert 'pip install "anisomesh[learn]"' in second
+
+
+@pytest.mark.parametrize("loss", ["dot", "l2", "cosine"])
+def test_the_network_of_the_paper_learns_too_and_is_no_metric(files, tmp_path, loss):
+    rows = train(options(tmp_path / "run", epochs=10, rate=1e-2, network=PAPER, loss=loss, noise_share=0.0), files)
+    assert rows[-1]["loss"] < 0.9 * rows[0]["loss"]
+    network, _ = load_weights(tmp_path / "run" / WEIGHTS)
+    assert network.options == PAPER
+    with pytest.raises(WeightsError, match="gives no metric"):
+        predict_metric(load_item(files.validation[0]).surface, tmp_path / "run" / WEIGHTS)

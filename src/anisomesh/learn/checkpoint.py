@@ -14,6 +14,7 @@ from torch import Tensor, nn
 
 from anisomesh.errors import AnisomeshError
 from anisomesh.learn.network import NetworkOptions, StretchNetwork
+from anisomesh.learn.paper import PaperNetwork, PaperOptions
 from anisomesh.surface.files import atomic_path
 
 
@@ -21,13 +22,23 @@ class WeightsError(AnisomeshError):
     """A file of weights or a checkpoint cannot be read, or belongs to another network."""
 
 
-def save_weights(network: StretchNetwork, path: Path, facts: dict[str, Any]) -> None:
+KINDS: dict[str, tuple[Any, Any]] = {
+    "default": (StretchNetwork, NetworkOptions),
+    "paper": (PaperNetwork, PaperOptions),
+}
+"""Networks and their sizes, by the name that files have for them."""
+
+Network = StretchNetwork | PaperNetwork
+
+
+def save_weights(network: Network, path: Path, facts: dict[str, Any]) -> None:
     """Write the weights of a network, its sizes, and facts about it, in one file of safetensors."""
-    head = {"network": json.dumps(asdict(network.options)), "facts": json.dumps(facts)}
+    kind = next(name for name, (made, _) in KINDS.items() if isinstance(network, made))
+    head = {"kind": kind, "network": json.dumps(asdict(network.options)), "facts": json.dumps(facts)}
     _write(path, save({name: value.contiguous() for name, value in network.state_dict().items()}, metadata=head))
 
 
-def load_weights(path: Path) -> tuple[StretchNetwork, dict[str, Any]]:
+def load_weights(path: Path) -> tuple[Network, dict[str, Any]]:
     """Return the network in a file, and the facts about it.
 
     Raises
@@ -37,7 +48,8 @@ def load_weights(path: Path) -> tuple[StretchNetwork, dict[str, Any]]:
     """
     tensors, head = _read(path)
     try:
-        network = StretchNetwork(NetworkOptions(**json.loads(head["network"])))
+        made, sizes = KINDS[head["kind"]]
+        network: Network = made(sizes(**json.loads(head["network"])))
         network.load_state_dict(tensors)
         return network, json.loads(head["facts"])
     except (KeyError, TypeError, RuntimeError, json.JSONDecodeError) as error:

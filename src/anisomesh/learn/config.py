@@ -7,7 +7,9 @@ from pathlib import Path
 from typing import Any
 
 from anisomesh.errors import OptionError
+from anisomesh.learn.losses import LOSSES
 from anisomesh.learn.network import NetworkOptions
+from anisomesh.learn.paper import PaperOptions
 from anisomesh.toml import check_keys, read_toml
 
 
@@ -35,7 +37,11 @@ class TrainingOptions:
     minutes
         Between checkpoints.
     network
-        Sizes of the network.
+        Kind and sizes of the network; in a file the table ``[network]`` has the sizes of the default network, the table
+        ``[paper]`` in its place those of the paper's.
+    loss, laplacian, gauge, augment
+        For the paper's network: ``"dot"``, ``"l2"`` or ``"cosine"``; the weight of the Laplacian loss; whether its
+        target is ``"aligned"`` first or taken ``"raw"`` as in the paper; and whether items are mirrored and turned.
     """
 
     data: str
@@ -50,17 +56,26 @@ class TrainingOptions:
     noise_share: float = 0.5
     seed: int = 0
     minutes: float = 5.0
-    network: NetworkOptions = field(default_factory=NetworkOptions)
+    network: NetworkOptions | PaperOptions = field(default_factory=NetworkOptions)
+    loss: str = "dot"
+    laplacian: float = 0.1
+    gauge: str = "aligned"
+    augment: bool = True
 
     def __post_init__(self) -> None:
         for name, low in (("epochs", 1), ("batch", 1), ("warmup", 0), ("seed", 0)):
             if getattr(self, name) < low:
                 raise OptionError(f"{name} = {getattr(self, name)}; expected at least {low}")
+        for name, known in (("loss", LOSSES), ("gauge", ("aligned", "raw"))):
+            if getattr(self, name) not in known:
+                raise OptionError(f"{name} = {getattr(self, name)!r}; expected one of {', '.join(known)}")
         for name in ("rate", "clip", "minutes"):
             if not getattr(self, name) > 0.0:
                 raise OptionError(f"{name} = {getattr(self, name)}; expected a positive number")
-        if not (0.0 <= self.noise_share <= 1.0 and self.noise >= 0.0 and self.weight_decay >= 0.0):
-            raise OptionError("noise and weight_decay must not be negative, and noise_share be between 0 and 1")
+        if not (0.0 <= self.noise_share <= 1.0 and min(self.noise, self.weight_decay, self.laplacian) >= 0.0):
+            raise OptionError(
+                "noise, weight_decay and laplacian must not be negative, and noise_share be between 0 and 1"
+            )
 
 
 def load_training(path: str | Path) -> TrainingOptions:
@@ -73,11 +88,14 @@ def load_training(path: str | Path) -> TrainingOptions:
     """
     path = Path(path)
     table = read_toml(path)
-    network = _values(f"{path}: [network]", NetworkOptions, table.pop("network", {}))
+    if "network" in table and "paper" in table:
+        raise OptionError(f"{path}: give either [network] or [paper]")
+    name, kind = ("paper", PaperOptions) if "paper" in table else ("network", NetworkOptions)
+    sizes = _values(f"{path}: [{name}]", kind, table.pop(name, {}))
     values = _values(str(path), TrainingOptions, table)
     for name in ("data", "out"):
         values[name] = str(path.parent / values[name])
-    return TrainingOptions(**values, network=NetworkOptions(**network))
+    return TrainingOptions(**values, network=kind(**sizes))
 
 
 def _values(where: str, kind: type, table: Any) -> dict[str, Any]:
@@ -91,7 +109,7 @@ def _values(where: str, kind: type, table: Any) -> dict[str, Any]:
             raise OptionError(f"{where}: {name} is missing")
         if name not in table:
             continue
-        wanted: Any = {"int": int, "float": int | float, "str": str}[str(entry.type)]
-        if not isinstance(table[name], wanted) or isinstance(table[name], bool):
+        wanted: Any = {"int": int, "float": int | float, "str": str, "bool": bool}[str(entry.type)]
+        if not isinstance(table[name], wanted) or isinstance(table[name], bool) != (wanted is bool):
             raise OptionError(f"{where}: {name} = {table[name]!r}; expected {entry.type}")
     return dict(table)

@@ -11,6 +11,7 @@ from torch import Tensor
 from anisomesh.learn.items import Item
 from anisomesh.learn.lines import directions_of, lines_in
 from anisomesh.learn.pyramid import Pyramid, pyramid
+from anisomesh.surface.mesh import Surface
 
 _UNTRUSTED = 0.1  # weight of points whose curvature is not known well
 
@@ -41,11 +42,7 @@ def example_of(item: Item, n_scales: int, noise: float = 0.0, rng: np.random.Gen
     """
     clean = item.surface
     directions, logarithms = directions_of(item.tensors)
-    seen = clean
-    if noise > 0.0 and rng is not None:
-        size = noise * float(clean.edge_lengths.mean())
-        seen = clean.with_points(clean.points + rng.normal(0.0, size, clean.points.shape))
-    scales = pyramid(seen, n_scales)
+    scales = pyramid(clean if rng is None else with_noise(clean, noise, rng), n_scales)
     area = np.bincount(clean.faces.ravel(), np.repeat(clean.face_areas, 3), minlength=clean.n_points)
     weight = area * np.where(item.trusted, 1.0, _UNTRUSTED)
     return Example(
@@ -53,3 +50,11 @@ def example_of(item: Item, n_scales: int, noise: float = 0.0, rng: np.random.Gen
         lines=torch.from_numpy(lines_in(scales.frames, directions, logarithms)),
         weight=torch.from_numpy((weight / weight.sum()).astype(np.float32)),
     )
+
+
+def with_noise(surface: Surface, noise: float, rng: np.random.Generator) -> Surface:
+    """Return a surface with noise of this deviation, in mean edge lengths, added to every coordinate."""
+    if noise == 0.0:
+        return surface
+    size = noise * float(surface.edge_lengths.mean())
+    return surface.with_points(surface.points + rng.normal(0.0, size, surface.points.shape))

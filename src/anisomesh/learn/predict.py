@@ -9,7 +9,7 @@ from pathlib import Path
 import torch
 
 from anisomesh._arrays import PointTensors
-from anisomesh.learn.checkpoint import load_weights
+from anisomesh.learn.checkpoint import WeightsError, load_weights
 from anisomesh.learn.lines import tensors_of
 from anisomesh.learn.network import StretchNetwork
 from anisomesh.learn.pyramid import pyramid
@@ -29,7 +29,7 @@ def predict_metric(surface: Surface, weights: str | os.PathLike[str]) -> PointTe
     Raises
     ------
     WeightsError
-        If the file cannot be read.
+        If the file cannot be read, or is of the paper's network.
     """
     path = Path(weights).resolve()
     network = _loaded(path, path.stat().st_mtime_ns if path.exists() else 0)
@@ -41,4 +41,7 @@ def predict_metric(surface: Surface, weights: str | os.PathLike[str]) -> PointTe
 @lru_cache(maxsize=4)
 def _loaded(path: Path, changed: int) -> StretchNetwork:
     """Return the network in a file, read again when the file has changed."""
-    return load_weights(path)[0].eval()
+    network = load_weights(path)[0]
+    if not isinstance(network, StretchNetwork):
+        raise WeightsError(f"{path} has weights of the paper's network, which gives no metric; train the default one")
+    return network.eval()

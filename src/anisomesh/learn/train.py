@@ -15,15 +15,12 @@ from typing import Any
 
 import numpy as np
 import torch
-from torch import Tensor
 
 from anisomesh.errors import OptionError
 from anisomesh.learn.checkpoint import WeightsError, load_state, save_state, save_weights
 from anisomesh.learn.config import TrainingOptions
-from anisomesh.learn.examples import Example, example_of
 from anisomesh.learn.items import load_item
-from anisomesh.learn.lines import line_loss
-from anisomesh.learn.network import StretchNetwork
+from anisomesh.learn.tasks import Task, task_of
 from anisomesh.surface.files import atomic_path
 
 CHECKPOINT, WEIGHTS, METRICS = "checkpoint.safetensors", "weights.safetensors", "metrics.jsonl"
@@ -90,9 +87,10 @@ def train(
         raise OptionError(f"{out} has a run already; go on with --resume, or name another folder")
     out.mkdir(parents=True, exist_ok=True)
     torch.manual_seed(options.seed)
-    network = StretchNetwork(options.network)
+    task = task_of(options)
+    network = task.network()
     optimiser = torch.optim.AdamW(network.parameters(), lr=options.rate, weight_decay=options.weight_decay)
-    run = _Run(options, files, network, optimiser, out)
+    run = _Run(options, task, files, network, optimiser, out)
     if resume:
         run.load()
     with _Interruption() as interrupted, _deterministic():
@@ -139,15 +137,16 @@ class _Run:
     def __init__(
         self,
         options: TrainingOptions,
+        task: Task,
         files: Files,
-        network: StretchNetwork,
+        network: Any,
         optimiser: torch.optim.Optimizer,
         out: Path,
     ) -> None:
-        self.options, self.files, self.network, self.optimiser, self.out = options, files, network, optimiser, out
+        self.options, self.task, self.files, self.out = options, task, files, out
+        self.network, self.optimiser = network, optimiser
         self.at = _Position()
         self._steps = max(1, math.ceil(len(files.training) / options.batch))
-        self._nothing: dict[float, float] = {}
 
     def epoch(self, interrupted: _Interruption) -> Row:
         """Go to the end of the epoch, save what it takes to go on, and return its row."""
@@ -191,9 +190,9 @@ class _Run:
                 losses, nothing = [], []
                 for number, path in enumerate(self.files.validation):
                     rng = np.random.default_rng([self.options.seed, number])
-                    example = example_of(load_item(path), self.options.network.scales, noise, rng)
-                    losses.append(float(_loss(self.network, example)))
-                    nothing.append(float(line_loss(torch.zeros_like(example.lines), example.lines, example.weight)))
+                    example = self.task.example(load_item(path), noise, rng, training=False)
+                    losses.append(float(self.task.loss(self.network, example)))
+                    nothing.append(self.task.loss_of_nothing(example))
                 found[f"validation {noise:g}"] = float(np.mean(losses) / max(float(np.mean(nothing)), 1e-30))
         self.network.train()
         return found
@@ -235,8 +234,8 @@ class _Run:
         for number in chosen.tolist():
             rng = np.random.default_rng([options.seed, self.at.epoch, number])
             noise = options.noise * rng.random() if rng.random() < options.noise_share else 0.0
-            example = example_of(load_item(self.files.training[number]), options.network.scales, noise, rng)
-            loss = _loss(self.network, example) / len(chosen)
+            example = self.task.example(load_item(self.files.training[number]), noise, rng, training=True)
+            loss = self.task.loss(self.network, example) / len(chosen)
             loss.backward()  # type: ignore[no-untyped-call]
             total += float(loss.detach())
         torch.nn.utils.clip_grad_norm_(self.network.parameters(), options.clip)
@@ -253,7 +252,3 @@ class _Run:
 
     def _items(self) -> list[str]:
         return sorted(path.name for path in [*self.files.training, *self.files.validation])
-
-
-def _loss(network: StretchNetwork, example: Example) -> Tensor:
-    return line_loss(network(example.pyramid), example.lines, example.weight)

@@ -1,0 +1,173 @@
+"""The paper's network and losses: against the formula edge by edge, under motions, and their derivatives."""
+
+import numpy as np
+import pytest
+
+torch = pytest.importorskip("torch")
+
+from anisomesh.learn.config import TrainingOptions  # noqa: E402
+from anisomesh.learn.items import Item  # noqa: E402
+from anisomesh.learn.losses import corner_dots, cosine_loss, dot_loss, l2_loss, laplacian_loss  # noqa: E402
+from anisomesh.learn.paper import (  # noqa: E402
+    PaperConvolution,
+    PaperNetwork,
+    PaperOptions,
+    TopK,
+    interpolated,
+    seen_of,
+)
+from anisomesh.learn.tasks import EmbeddingTask, random_symmetry  # noqa: E402
+from anisomesh.surface.mesh import Surface  # noqa: E402
+from anisomesh.surface.shapes import sphere, torus  # noqa: E402
+
+
+def shaken(surface):
+    rng = np.random.default_rng(0)
+    return surface.with_points(surface.points + rng.normal(0.0, 0.01, surface.points.shape))
+
+
+def embedded(surface, seed=0):
+    """Return random extra coordinates, the surface in 8-D with them, faces and edges, as tensors of float64."""
+    extra = torch.from_numpy(np.random.default_rng(seed).normal(size=(surface.n_points, 5)))
+    whole = torch.cat([torch.from_numpy(surface.points.copy()), extra], dim=1)
+    faces, edges = (torch.from_numpy(table.astype(np.int64)) for table in (surface.faces, surface.edges))
+    return extra, whole, faces, edges
+
+
+def turned(values, seed=1):
+    turn = np.linalg.qr(np.random.default_rng(seed).normal(size=(values.shape[1],) * 2))[0]
+    return values @ torch.from_numpy(turn)
+
+
+def test_the_convolution_is_the_formula_of_the_paper():
+    torch.manual_seed(0)
+    surface = sphere(1)
+    seen = seen_of(surface)
+    layer = PaperConvolution(6, 4)
+    b = layer.own.weight
+    a = layer.sent.weight - b
+    found = layer(seen.values, seen.graph)
+    for i in range(surface.n_points):
+        f_i = seen.values[i]
+        messages = []
+        for e in range(seen.graph.first[i], seen.graph.first[i + 1]):
+            f_j = seen.values[seen.graph.neighbour[e]]
+            messages.append(a @ f_j + b @ (f_j - f_i) + layer.away[0] * torch.linalg.norm(f_j - f_i))
+        wanted = layer.out(torch.cat([f_i, torch.stack(messages).amax(dim=0)]))
+        torch.testing.assert_close(found[i], wanted, atol=1e-5, rtol=1e-5)
+
+
+def test_pooling_keeps_the_nodes_of_largest_score():
+    pool = TopK(3, 0.5)
+    x = torch.randn(11, 3)
+    values, kept = pool(x)
+    score = x @ pool.direction / pool.direction.norm()
+    assert len(kept) == 6
+    assert score[kept].min() >= score[np.setdiff1d(np.arange(11), kept)].max()
+    torch.testing.assert_close(values, x[kept] * torch.tanh(score[kept])[:, None])
+
+
+def test_interpolation_gives_back_what_was_kept_and_means_between():
+    points = np.array([[0.0, 0, 0], [1, 0, 0], [2, 0, 0], [0.5, 0, 0]])
+    values = interpolated(torch.tensor([[1.0], [3.0], [9.0]]), points, np.array([0, 1, 2]))
+    torch.testing.assert_close(values[:3], torch.tensor([[1.0], [3.0], [9.0]]), atol=1e-6, rtol=0)
+    assert 2.0 < float(values[3]) < 4.0
+
+
+def test_the_network_ignores_the_order_of_points_and_faces():
+    torch.manual_seed(0)
+    network = PaperNetwork(PaperOptions(channels=16, levels=3)).eval()
+    surface = shaken(torus(n_major=24, n_minor=10))
+    rng = np.random.default_rng(0)
+    order = rng.permutation(surface.n_points)
+    other = Surface(surface.points[order], np.argsort(order)[surface.faces][rng.permutation(surface.n_faces)])
+    with torch.no_grad():
+        mine, theirs = network(seen_of(surface)), network(seen_of(other))
+    assert mine.shape == (surface.n_points, 5)
+    torch.testing.assert_close(theirs, mine[order], atol=1e-4, rtol=1e-4)
+
+
+def test_all_weights_of_the_network_take_part():
+    torch.manual_seed(0)
+    network = PaperNetwork(PaperOptions(channels=8, levels=3))
+    network(seen_of(shaken(torus(n_major=24, n_minor=10)))).square().sum().backward()
+    assert all(value.grad is not None and value.grad.abs().sum() > 0 for value in network.parameters())
+
+
+def test_dot_products_are_lengths_and_angles():
+    surface = sphere(1)
+    _, whole, faces, _ = embedded(surface)
+    a, b, c = whole[faces[0]]
+    expected = torch.stack([(b - a) @ (c - a), (c - b) @ (a - b), (a - c) @ (b - c)])
+    torch.testing.assert_close(corner_dots(whole, faces)[0], expected)
+
+
+@pytest.mark.parametrize("name", ["dot", "l2", "cosine", "laplacian", "raw laplacian"])
+def test_losses_vanish_at_the_answer_and_those_with_a_gauge_see_motions(name):
+    surface = shaken(sphere(2))
+    extra, whole, faces, edges = embedded(surface)
+    losses = {
+        "dot": lambda x: dot_loss(torch.cat([whole[:, :3], x], dim=1), whole, faces),
+        "l2": lambda x: l2_loss(x, extra),
+        "cosine": lambda x: cosine_loss(x, extra),
+        "laplacian": lambda x: laplacian_loss(x, extra, edges),
+        "raw laplacian": lambda x: laplacian_loss(x, extra, edges, aligned=False),
+    }
+    loss = losses[name]
+    assert float(loss(extra)) == pytest.approx(0.0, abs=1e-12)
+    moved = float(loss(turned(extra)))
+    assert (moved < 1e-9) if name in ("dot", "laplacian") else (moved > 0.1)
+    other = embedded(surface, seed=7)[0].requires_grad_(True)
+    value = loss(other)
+    (gradient,) = torch.autograd.grad(value, other)
+    step, way = 1e-6, torch.from_numpy(np.random.default_rng(3).normal(size=extra.shape))
+    if name == "laplacian":
+        return  # its alignment moves with the values and is not differentiated, on purpose
+    with torch.no_grad():
+        slope = float(loss(other + step * way) - loss(other - step * way)) / (2 * step)
+    assert float((gradient * way).sum()) == pytest.approx(slope, rel=1e-5)
+
+
+def test_dot_loss_does_not_depend_on_the_size_of_the_mesh():
+    surface = sphere(1)
+    _, whole, faces, _ = embedded(surface)
+    other = embedded(surface, seed=5)[1]
+    assert float(dot_loss(other, whole, faces)) == pytest.approx(float(dot_loss(9.0 * other, 9.0 * whole, faces)))
+
+
+def test_the_laplacian_of_linear_values_on_a_regular_grid_is_zero_within():
+    from anisomesh.learn.losses import _laplacian
+    from anisomesh.surface.shapes import open_patch
+
+    patch = open_patch(lambda x, y: 0.0 * x, n=6)
+    values = torch.from_numpy(patch.points @ np.random.default_rng(0).normal(size=(3, 2)))
+    found = _laplacian(values, torch.from_numpy(patch.edges.astype(np.int64)))
+    torch.testing.assert_close(
+        found[~torch.from_numpy(patch.on_boundary.copy())].abs().max(), torch.tensor(0.0, dtype=torch.float64)
+    )
+
+
+def test_symmetries_of_the_augmentation_are_ten_and_targets_turn_with_the_mesh():
+    turns = [random_symmetry(np.random.default_rng(seed)) for seed in range(300)]
+    different = {tuple(turn.round(6).ravel()) for turn in turns}
+    assert len(different) == 10
+    for turn in turns:
+        np.testing.assert_allclose(turn @ turn.T, np.eye(3), atol=1e-12)
+    assert sum(np.linalg.det(np.reshape(turn, (3, 3))) < 0 for turn in different) == 3
+    surface = shaken(sphere(2))
+    surface = surface.with_points(surface.points / surface.diagonal)
+    tensors = np.tile(np.diag([1.0, 2.0, 4.0]), (surface.n_points, 1, 1))
+    extra = np.random.default_rng(0).normal(size=(surface.n_points, 5))
+    item = Item.of(surface, tensors, extra, np.ones(surface.n_points, dtype=bool))
+    task = EmbeddingTask(TrainingOptions(data="", out="", network=PaperOptions(channels=8, levels=2)))
+    plain = task.example(item, 0.0, np.random.default_rng(0), training=False)
+    whole = torch.cat([plain.points, plain.extra], dim=1)
+    for seed in range(20):
+        turn = random_symmetry(np.random.default_rng(seed))
+        example = task.example(item, 0.0, np.random.default_rng(seed), training=True)
+        points = example.points.numpy()
+        np.testing.assert_allclose(points, surface.points @ turn.T, atol=1e-6)
+        np.testing.assert_allclose(example.seen.values[:, 3:], surface.point_normals @ turn.T * 1.0, atol=1e-5)
+        moved = torch.cat([example.points, example.extra], dim=1)
+        dots = corner_dots(moved, plain.faces)
+        torch.testing.assert_close(dots, corner_dots(whole, plain.faces), atol=1e-4, rtol=1e-4)
