@@ -189,6 +189,32 @@ def test_the_command_trains_stops_and_resumes(files, tmp_path, run_cli):
     assert f"epoch {before}:" not in done.stderr
 
 
+def test_two_workers_train_as_one(files, tmp_path):
+    train(options(tmp_path / "one", epochs=2), files)
+    text = CONFIG.replace('"items"', f'"{files.training[0].parent}"').replace("batch = 2", "batch = 2\nwarmup = 2")
+    (tmp_path / "a.toml").write_text(text.replace('"run"', '"two"'))
+    command = [sys.executable, "-m", "torch.distributed.run", "--standalone", "--nproc-per-node", "2", "-m"]
+    environment = {**os.environ, "OMP_NUM_THREADS": "1"}
+    done = subprocess.run(
+        [*command, "anisomesh", "train", "a.toml"],
+        cwd=tmp_path,
+        env=environment,
+        capture_output=True,
+        text=True,
+        timeout=240,
+        check=False,
+    )
+    assert done.returncode == 0, done.stderr
+    one, two = (
+        [json.loads(line) for line in (tmp_path / name / METRICS).read_text().splitlines()] for name in ("one", "two")
+    )
+    assert len(one) == len(two) == 2
+    for mine, theirs in zip(one, two, strict=True):
+        for name in ("loss", "validation 0", "validation 0.3"):
+            assert theirs[name] == pytest.approx(mine[name], rel=1e-3)
+    assert done.stderr.count("epoch 2:") == 1
+
+
 def test_a_remesh_takes_the_metric_of_a_trained_network(files, tmp_path, run_cli):
     surface = load_item(files.validation[0]).surface
     train(options(tmp_path / "run", epochs=12, rate=1e-2), files)

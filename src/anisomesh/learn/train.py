@@ -21,6 +21,7 @@ from anisomesh.learn.checkpoint import WeightsError, load_state, save_state, sav
 from anisomesh.learn.config import TrainingOptions
 from anisomesh.learn.items import load_item
 from anisomesh.learn.tasks import Task, task_of
+from anisomesh.learn.workers import Workers, workers
 from anisomesh.surface.files import atomic_path
 
 CHECKPOINT, WEIGHTS, METRICS = "checkpoint.safetensors", "weights.safetensors", "metrics.jsonl"
@@ -78,7 +79,8 @@ def train(
     -----
     The order of items and their noise depend on the seed, the epoch and the step alone, so a checkpoint needs no state
     of a generator. Checkpoints are written every few minutes, after every epoch, and on SIGTERM and Ctrl-C, which end
-    the run. ``weights.safetensors`` are those of the best epoch on the validation items.
+    the run. ``weights.safetensors`` are those of the best epoch on the validation items. Under torchrun every process
+    takes its part of each batch, and the first one writes the files.
     """
     out = Path(options.out)
     if not files.training or not files.validation:
@@ -90,14 +92,16 @@ def train(
     task = task_of(options)
     network = task.network()
     optimiser = torch.optim.AdamW(network.parameters(), lr=options.rate, weight_decay=options.weight_decay)
-    run = _Run(options, task, files, network, optimiser, out)
-    if resume:
-        run.load()
-    with _Interruption() as interrupted, _deterministic():
+    with _Interruption() as interrupted, _deterministic(), workers() as group:
+        run = _Run(options, task, files, network, optimiser, out, group)
+        if resume:
+            run.load()
+        group.wait()  # before the first writes what others look for
         while run.at.epoch < options.epochs:
             row = run.epoch(interrupted)
-            on_row(row)
-    return run.rows()
+            if group.is_first:
+                on_row(row)
+        return run.rows()
 
 
 @contextmanager
@@ -142,9 +146,10 @@ class _Run:
         network: Any,
         optimiser: torch.optim.Optimizer,
         out: Path,
+        group: Workers,
     ) -> None:
         self.options, self.task, self.files, self.out = options, task, files, out
-        self.network, self.optimiser = network, optimiser
+        self.network, self.optimiser, self.group = network, optimiser, group
         self.at = _Position()
         self._steps = max(1, math.ceil(len(files.training) / options.batch))
 
@@ -157,29 +162,35 @@ class _Run:
             chosen = order[self.at.step * options.batch : (self.at.step + 1) * options.batch]
             self.at.total += self._step(chosen)
             self.at.step += 1
-            if interrupted.came or time.monotonic() - saved > 60.0 * options.minutes:
+            came = self.group.total(interrupted.came) > 0.0
+            if came or time.monotonic() - saved > 60.0 * options.minutes:
                 self.save()
                 saved = time.monotonic()
-            if interrupted.came:
+            if came:
                 raise KeyboardInterrupt
-        row = {
+        row: Row = {
             "epoch": self.at.epoch + 1,
             "loss": self.at.total / self._steps,
             "rate": self._rate(self.at.epoch * self._steps + self._steps),
-            **self.validate(),
-            "seconds": round(time.monotonic() - start, 1),
         }
-        score = row[f"validation {VALIDATION_NOISE[0]:g}"] + row[f"validation {VALIDATION_NOISE[-1]:g}"]
+        self.at.epoch, self.at.step, self.at.total = self.at.epoch + 1, 0, 0.0
+        if self.group.is_first:
+            self._conclude(row, start)
+        self.group.wait()
+        return row
+
+    def _conclude(self, row: Row, start: float) -> None:
+        """Validate, and write weights, measurements and checkpoint at the end of an epoch."""
+        row |= {**self.validate(), "seconds": round(time.monotonic() - start, 1)}
+        score = sum(value for name, value in row.items() if name.startswith("validation"))
         if score < self.at.best:
             self.at.best = score
-            facts = {name: row[name] for name in row if name != "seconds"} | {"training": asdict(options)}
+            facts = {name: row[name] for name in row if name != "seconds"} | {"training": asdict(self.options)}
             save_weights(self.network, self.out / WEIGHTS, facts)
-        self.at.epoch, self.at.step, self.at.total = self.at.epoch + 1, 0, 0.0
-        rows = [*self.rows(), row]
+        rows = [*(known for known in self.rows() if known["epoch"] < row["epoch"]), row]
         with atomic_path(self.out / METRICS) as temporary:
             Path(temporary).write_text("".join(json.dumps(entry) + "\n" for entry in rows), encoding="utf-8")
         self.save()
-        return row
 
     def validate(self) -> Row:
         """Return the mean loss on the validation items at each noise, over that of predicting nothing."""
@@ -204,7 +215,9 @@ class _Run:
         return [row for row in map(json.loads, lines) if row["epoch"] <= self.at.epoch]
 
     def save(self) -> None:
-        """Write the checkpoint."""
+        """Write the checkpoint, in the first process."""
+        if not self.group.is_first:
+            return
         state = {"at": asdict(self.at), "training": asdict(self.options), "items": self._items()}
         save_state(self.out / CHECKPOINT, self.network, self.optimiser, state)
 
@@ -231,18 +244,19 @@ class _Run:
         options = self.options
         self.optimiser.zero_grad()
         total = 0.0
-        for number in chosen.tolist():
+        for number in chosen.tolist()[self.group.rank :: self.group.size]:
             rng = np.random.default_rng([options.seed, self.at.epoch, number])
             noise = options.noise * rng.random() if rng.random() < options.noise_share else 0.0
             example = self.task.example(load_item(self.files.training[number]), noise, rng, training=True)
             loss = self.task.loss(self.network, example) / len(chosen)
             loss.backward()  # type: ignore[no-untyped-call]
             total += float(loss.detach())
+        self.group.sum_gradients(self.network.parameters())
         torch.nn.utils.clip_grad_norm_(self.network.parameters(), options.clip)
         for group in self.optimiser.param_groups:
             group["lr"] = self._rate(self.at.epoch * self._steps + self.at.step)
         self.optimiser.step()
-        return total
+        return self.group.total(total)
 
     def _rate(self, step: int) -> float:
         """Return the learning rate at a step of the whole run."""
