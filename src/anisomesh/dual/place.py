@@ -20,7 +20,7 @@ from anisomesh.surface.mesh import Surface
 
 _SHARPNESS = 100.0
 _MOST_OFF = 0.1  # mean edge lengths by which the vertex may be off a curved crease
-_SAME_PLANE = 1e-9  # by which the normals of facets in one plane may differ,
+_SAME_PLANE = 1e-9  # by which the normals of facets in one plane may differ
 _MISSED = 0.05  # mean edge lengths between a corner and the mesh, from which on it counts as missed
 
 
