@@ -23,7 +23,7 @@ from anisomesh.cvt.sampling import resample_by_energy, sample_surface
 from anisomesh.cvt.voronoi import Evaluation, RestrictedVoronoi
 from anisomesh.embedding.direct import embed
 from anisomesh.metric.tensor import compute_metric
-from anisomesh.pipeline import DENSITY_SHARPNESS
+from anisomesh.schedule import DENSITY_SHARPNESS
 from anisomesh.surface.geometry import unit_frame
 from anisomesh.surface.mesh import Surface
 from anisomesh.surface.shapes import twisted_ring
