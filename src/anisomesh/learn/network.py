@@ -12,6 +12,7 @@ from anisomesh.learn.messages import largest_of_neighbours
 from anisomesh.learn.pyramid import N_EDGE, N_NODE, Pyramid, Scale
 
 _EPSILON = 1e-5
+_INPUT_SCALE = 0.3  # brings what is seen to about 1; a norm over the mesh would hide how large curvatures are
 _SLOPE = 0.1
 
 
@@ -143,7 +144,6 @@ class StretchNetwork(nn.Module):
         self.up = nn.ModuleList(Blocks(channels, options.blocks) for _ in range(scales - 1))
         self.join = nn.ModuleList(nn.Linear(2 * channels, channels) for _ in range(scales - 1))
         self.heads = nn.ModuleList(Head(channels) for _ in range(options.heads))
-        self.inputs = nn.ModuleList(Norm(N_NODE) for _ in range(scales))
 
     def forward(self, pyramid: Pyramid) -> Tensor:
         """Return lines (N, 2)."""
@@ -151,7 +151,7 @@ class StretchNetwork(nn.Module):
         kept: list[Tensor] = []
         x: Tensor | None = None
         for k, scale in enumerate(pyramid.scales):
-            seen = self.enter[k](self.inputs[k](torch.from_numpy(scale.nodes).to(device)))
+            seen = self.enter[k](_INPUT_SCALE * torch.from_numpy(scale.nodes).to(device))
             x = seen if x is None else seen + _pooled(x, pyramid.scales[k - 1])
             x = self.down[k](x, scale.graph)
             kept.append(x)
