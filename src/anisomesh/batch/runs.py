@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import json
-import os
 import time
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
@@ -18,6 +17,7 @@ from anisomesh.batch.suite import Method, Suite
 from anisomesh.errors import AnisomeshError
 from anisomesh.evaluation.report import evaluate
 from anisomesh.isolation import isolated
+from anisomesh.surface.files import append_line, drop_cut_line
 from anisomesh.surface.mesh import Surface
 from anisomesh.surface.prepare import prepare
 
@@ -65,7 +65,7 @@ def run_suite(
         If a mesh of the suite cannot be found.
     """
     inputs = inputs_of(suite, data)
-    _drop_cut_row(out)
+    drop_cut_line(out)
     known = {_key(row): row for row in read_rows(out)}
     jobs = [job for job in _jobs(suite, inputs) if not _is_done(known.get(job.key), job)]
     start = time.monotonic()
@@ -80,7 +80,7 @@ def run_suite(
         if loaded is not None:
             row = _run(job, loaded[1], suite)
         if row["status"] != "absent":
-            _append(out, row)
+            append_line(out, json.dumps(row, default=_plain, allow_nan=False))
         known[job.key] = row
         left = (time.monotonic() - start) / number * (len(jobs) - number)
         on_row(Progress(row, number, len(jobs), left))
@@ -163,22 +163,6 @@ def _run(job: _Job, surface: Surface, suite: Suite) -> Row:
         "facts": produced.facts,
         "evaluation": evaluation,
     }
-
-
-def _append(path: Path, row: Row) -> None:
-    """Write a row at the end of the file, to the disk."""
-    with path.open("a", encoding="utf-8") as file:
-        file.write(json.dumps(row, default=_plain, allow_nan=False) + "\n")
-        file.flush()
-        os.fsync(file.fileno())
-
-
-def _drop_cut_row(path: Path) -> None:
-    """Take away what is left of a last row that was being written when the process ended."""
-    if path.exists():
-        content = path.read_bytes()
-        if not content.endswith(b"\n"):
-            os.truncate(path, content.rfind(b"\n") + 1)
 
 
 def _plain(value: Any) -> Any:

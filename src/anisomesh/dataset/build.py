@@ -5,7 +5,6 @@ from __future__ import annotations
 import csv
 import hashlib
 import json
-import os
 from collections.abc import Callable, Iterator
 from concurrent.futures import FIRST_COMPLETED, Future, ThreadPoolExecutor, wait
 from dataclasses import asdict, dataclass
@@ -19,6 +18,7 @@ from anisomesh.dataset.make import Made, Recipe, UnsuitableError, items_of_blobs
 from anisomesh.errors import AnisomeshError, MeshFileError, OptionError
 from anisomesh.isolation import isolated
 from anisomesh.learn.items import save_item
+from anisomesh.surface.files import append_line, drop_cut_line
 from anisomesh.surface.io import FORMATS, load
 
 MANIFEST = "manifest.jsonl"
@@ -129,12 +129,13 @@ def build(
     if not 0.0 <= validation < 1.0 or workers < 1:
         raise OptionError(f"validation = {validation}, workers = {workers}; expected a share below 1, and 1 or more")
     out.mkdir(parents=True, exist_ok=True)
+    drop_cut_line(out / MANIFEST)
     known = {row["name"]: row for row in read_manifest(out)}
     starts = {source.name: _start(source, recipe, validation) for source in sources}
     jobs = [source for source in sources if not _is_done(known.get(source.name), starts[source.name], out)]
     for number, (source, row) in enumerate(_in_parallel(jobs, out, recipe, workers), 1):
         known[source.name] = {**starts[source.name], **row}
-        _append(out / MANIFEST, known[source.name])
+        append_line(out / MANIFEST, json.dumps(known[source.name], allow_nan=False))
         on_row(known[source.name], number, len(jobs))
     return [{**known[name], "split": start["split"]} for name, start in starts.items()]
 
@@ -238,15 +239,3 @@ def _families(folder: Path) -> dict[Path, str]:
 def _number(text: str) -> int:
     """Return a number below 2^32 that depends on a text alone."""
     return int.from_bytes(hashlib.sha256(text.encode()).digest()[:4], "big")
-
-
-def _append(path: Path, row: Row) -> None:
-    """Write a row at the end of the list, to the disk; what is left of one that was cut off goes first."""
-    if path.exists():
-        content = path.read_bytes()
-        if content and not content.endswith(b"\n"):
-            os.truncate(path, content.rfind(b"\n") + 1)
-    with path.open("a", encoding="utf-8") as file:
-        file.write(json.dumps(row, allow_nan=False) + "\n")
-        file.flush()
-        os.fsync(file.fileno())
