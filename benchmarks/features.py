@@ -16,6 +16,7 @@ import anisomesh
 from anisomesh.surface.features import points_along, sharp_edges
 from anisomesh.surface.mesh import Surface
 from anisomesh.surface.shapes import cad_features, cad_part
+from anisomesh.surface.topology import edge_keys
 
 REACH = 0.1  # of the mean edge length: a point of a crease is covered if an edge of the result is so near
 BEND = 5.0  # and its faces differ by so many degrees at least
@@ -23,8 +24,7 @@ BEND = 5.0  # and its faces differ by so many degrees at least
 
 def edges_between(surface: Surface, ends: np.ndarray) -> np.ndarray:
     """Return which edges (E,) of a surface join these pairs of points (n, 2)."""
-    keys = [np.sort(pairs, axis=1) @ [surface.n_points, 1] for pairs in (surface.edges.astype(np.int64), ends)]
-    return np.isin(*keys)
+    return np.isin(edge_keys(surface.edges), edge_keys(ends))
 
 
 def measure_part(resolution: int, ratio: float, final: float | None) -> str:

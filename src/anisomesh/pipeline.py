@@ -23,6 +23,7 @@ from anisomesh.embedding.direct import embed
 from anisomesh.errors import MetricError, OptionError, TimeLimitError
 from anisomesh.evaluation.validity import Validity, check_validity
 from anisomesh.learn import require_torch
+from anisomesh.memory import check_memory
 from anisomesh.metric.tensor import MetricName, compute_metric
 from anisomesh.options import OnStep, RemeshOptions, StepInfo
 from anisomesh.result import RemeshResult
@@ -33,6 +34,7 @@ from anisomesh.surface.features import sharp_edges
 from anisomesh.surface.geometry import unit_frame
 from anisomesh.surface.mesh import Surface
 from anisomesh.surface.prepare import Prepared, prepare
+from anisomesh.surface.subdivide import Refined as Subdivided
 from anisomesh.surface.subdivide import split_long_edges
 from anisomesh.surface.tagged import edges_within, tagged_edges
 
@@ -42,7 +44,6 @@ EDGE_FACTOR = 1.6  # and no longer than this many distances between sites
 MAX_GROWTH = 8  # splitting makes at most so many times the faces, or MAX_SPLIT_FACES
 MAX_SPLIT_FACES = 60_000
 OPTIMISATION_SHARE = 0.6  # of the time limit is for all up to the end of the optimisation
-BYTES_PER_VERTEX, BYTES_PER_FACE = 6_000, 1_500  # of memory; measured with benchmarks/speed.py
 
 
 def remesh(
@@ -134,9 +135,9 @@ def _remesh(
     with run.stage("prepare"):
         frame = unit_frame(prepared.surface.points)
         unit = prepared.surface.with_points(frame.to_unit(prepared.surface.points))
-        split = split_long_edges(unit, max_edge(unit, n), max_faces=max(MAX_GROWTH * unit.n_faces, MAX_SPLIT_FACES))
+        split = _split(unit, n)
         working = split.surface
-        _check_memory(n, working.n_faces)
+        check_memory(n, working.n_faces)
     with run.stage("metric"):
         if not isinstance(wanted, str):
             wanted = split.interpolate(wanted) * frame.scale**2
@@ -185,6 +186,11 @@ def _remesh(
         seconds=run.total_seconds(),
         warnings=tuple(_warnings(n, surface, refined, validity, optimised, options)),
     )
+
+
+def _split(surface: Surface, n: int) -> Subdivided:
+    """Return a surface with edges fine enough for n sites, or as fine as the bound on its faces allows."""
+    return split_long_edges(surface, max_edge(surface, n), max_faces=max(MAX_GROWTH * surface.n_faces, MAX_SPLIT_FACES))
 
 
 def _predicted(surface: Surface, weights: str | os.PathLike[str]) -> npt.NDArray[np.float64]:
@@ -255,18 +261,6 @@ def _check_count(n_vertices: int | None, ratio: float | None, max_error: float |
         raise OptionError(f"n_vertices = {n_vertices}; expected a whole number of at least {MIN_VERTICES}")
     if ratio is not None and not (np.isfinite(ratio) and ratio > 0.0):
         raise OptionError(f"ratio = {ratio}; expected a positive number, such as 0.2 for a fifth of the vertices")
-
-
-def _check_memory(n: int, n_faces: int) -> None:
-    """Refuse what cannot fit into the memory of this machine, before hours are spent on it."""
-    try:
-        there = os.sysconf("SC_PAGE_SIZE") * os.sysconf("SC_PHYS_PAGES")
-    except (AttributeError, ValueError, OSError):  # not a system that tells
-        return
-    needed = BYTES_PER_VERTEX * n + BYTES_PER_FACE * n_faces
-    if needed > there:
-        sizes = f"about {needed / 2**30:,.0f} GiB of memory, and this machine has {there / 2**30:,.0f}"
-        raise OptionError(f"{n:,} vertices need {sizes}; ask for fewer")
 
 
 def _even_edge(area: float, n: int) -> float:

@@ -7,6 +7,7 @@ from anisomesh.cvt.voronoi import RestrictedVoronoi
 from anisomesh.dual.cells import cells_of
 from anisomesh.dual.decimate import collapsible_edges, decimate
 from anisomesh.dual.exchange import exchange_sites
+from anisomesh.dual.grow import grow
 from anisomesh.dual.place import cells_with_crease, crease_positions, snap_to_missed
 from anisomesh.dual.simplicial import simplicial_mesh
 from anisomesh.dual.triangulate import dual_mesh
@@ -250,3 +251,21 @@ def test_a_component_of_one_triangle_is_not_collapsed():
     _, coarse, _ = decimate(points, faces, 10, reference)
     assert topology.connected_components(coarse, coarse.max() + 1)[0] == 2
     assert topology.euler_characteristic(coarse) == 3
+
+
+@pytest.mark.parametrize("name", [*SHAPES, "open"])
+def test_splits_reach_the_number_on_the_surface_and_keep_topology_and_side(name):
+    surface = open_patch(lambda x, y: 0.3 * x * y, n=16) if name == "open" else SHAPES[name]
+    reference = ClosestPoints(surface)
+    points, faces, _ = decimate(surface.points, surface.faces, surface.n_points // 3, reference)
+    roots = np.tile(np.diag([1.0, 1.0, 3.0]), (len(points), 1, 1))
+    n = len(points) + 37
+    grown, new_faces = grow(points, faces, n, reference, roots)
+    assert len(grown) == n
+    np.testing.assert_array_equal(grown[: len(points)], points)
+    result = Surface(grown, new_faces)
+    assert_same_topology(result, surface)
+    assert flipped_faces(result, surface).sum() == 0
+    inner = np.arange(len(points), n)[~result.on_boundary[len(points) :]]
+    assert np.sqrt(reference.squared_distances(grown[inner])).max() < 1e-9
+    assert grow(points, faces, len(points), reference, roots)[0] is points

@@ -49,13 +49,13 @@ def grow(
             if len(points) + len(added) == n_points or taken[around].any():
                 continue
             number = len(points) + len(added)
-            halves = [np.where(faces[face] == end, number, faces[face]) for face in around for end in ends[edge]]
-            corners = np.concatenate([points, np.zeros((len(added), 3)), place[k][None]])[np.array(halves)]
+            halves = [(faces[face], faces[face] == end) for face in around for end in ends[edge]]
+            corners = np.stack([np.where(split[:, None], place[k], points[face]) for face, split in halves])
             if not reference.clearly_facing(corners).all():
                 continue
             taken[around] = True
             gone.append(around)
-            new += [half.tolist() for half in halves]
+            new += [np.where(split, number, face).tolist() for face, split in halves]
             added.append(k)
         if not added:
             break
