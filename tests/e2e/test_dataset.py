@@ -11,10 +11,11 @@ import numpy as np
 import pytest
 
 import anisomesh
-from anisomesh.dataset.build import MANIFEST, build, read_manifest, sources_of
+from anisomesh.dataset.build import build, sources_of
 from anisomesh.dataset.make import Recipe
 from anisomesh.errors import MeshFileError, OptionError
 from anisomesh.learn.items import load_item
+from anisomesh.learn.manifest import MANIFEST, read_manifest
 from anisomesh.surface.shapes import ellipsoid, sphere, torus
 
 RECIPE = Recipe(target=200, variants=("decimated",))

@@ -13,6 +13,8 @@ import pytest
 
 torch = pytest.importorskip("torch")
 
+from tensorboard.backend.event_processing.event_accumulator import EventAccumulator  # noqa: E402
+
 import anisomesh  # noqa: E402
 from anisomesh.dataset.implicit import Blobs  # noqa: E402
 from anisomesh.dataset.make import Recipe, items_of_blobs  # noqa: E402
@@ -20,10 +22,15 @@ from anisomesh.errors import OptionError  # noqa: E402
 from anisomesh.learn.checkpoint import WeightsError, load_weights  # noqa: E402
 from anisomesh.learn.config import TrainingOptions, load_training  # noqa: E402
 from anisomesh.learn.items import load_item, save_item  # noqa: E402
+from anisomesh.learn.manifest import Files  # noqa: E402
 from anisomesh.learn.network import NetworkOptions  # noqa: E402
 from anisomesh.learn.paper import PaperOptions  # noqa: E402
-from anisomesh.learn.predict import predict_metric  # noqa: E402
-from anisomesh.learn.train import CHECKPOINT, METRICS, WEIGHTS, Files, train  # noqa: E402
+from anisomesh.learn.predict import predict  # noqa: E402
+from anisomesh.learn.shipped import weights_path  # noqa: E402
+from anisomesh.learn.train import CHECKPOINT, EVENTS, METRICS, WEIGHTS, train  # noqa: E402
+from anisomesh.pipeline import max_edge  # noqa: E402
+from anisomesh.surface.geometry import unit_frame  # noqa: E402
+from anisomesh.surface.subdivide import split_long_edges  # noqa: E402
 
 PAPER = PaperOptions(channels=8, levels=2)
 NETWORK = NetworkOptions(channels=16, scales=3, blocks=1, heads=2)
@@ -72,6 +79,10 @@ def test_a_run_learns_and_writes_its_files(files, tmp_path):
     assert rows[-1]["loss"] < 0.8 * rows[0]["loss"]
     lines = (tmp_path / "run" / METRICS).read_text().splitlines()
     assert [json.loads(line) for line in lines] == rows
+    events = EventAccumulator(str(tmp_path / "run" / EVENTS)).Reload()
+    assert [(event.step, pytest.approx(event.value)) for event in events.Scalars("loss")] == [
+        (row["epoch"], row["loss"]) for row in rows
+    ]
     network, facts = load_weights(tmp_path / "run" / WEIGHTS)
     assert network.options == NETWORK
     assert facts["training"]["epochs"] == 12
@@ -96,6 +107,16 @@ def test_a_run_that_was_stopped_goes_on_as_if_it_had_not_been(files, tmp_path, s
     assert [row["epoch"] for row in seen] == list(range(stop_after + 1, 5))
     for name, value in weights(tmp_path / "whole").items():
         torch.testing.assert_close(weights(tmp_path / "cut")[name], value, rtol=0, atol=0)
+
+
+def test_a_run_starts_from_weights_and_refuses_those_of_another_network(files, tmp_path):
+    first = train(options(tmp_path / "one", epochs=8, rate=1e-2), files)
+    given = tmp_path / "one" / WEIGHTS
+    more = train(options(tmp_path / "two", epochs=1, rate=1e-6, start=str(given)), files)
+    best = min(first, key=lambda row: row["validation 0"] + row["validation 0.3"])
+    assert more[0]["validation 0"] == pytest.approx(best["validation 0"], rel=1e-2)
+    with pytest.raises(WeightsError, match="another kind or size"):
+        train(options(tmp_path / "three", start="default"), files)
 
 
 def test_handlers_of_signals_are_as_before(files, tmp_path):
@@ -168,6 +189,15 @@ def test_folders_of_a_configuration_are_relative_to_its_file(tmp_path):
     assert load_training(tmp_path / "a.toml").network == PAPER
 
 
+def test_shipped_configurations_are_relative_to_the_current_folder():
+    loaded = load_training("default")
+    assert (loaded.data, loaded.out) == ("items", "default")
+    network, facts = load_weights(weights_path("default"))
+    assert loaded.network == network.options
+    same = {name: facts["training"][name] for name in ("epochs", "batch", "rate", "noise", "noise_share", "seed")}
+    assert same == {name: getattr(loaded, name) for name in same}
+
+
 def test_the_command_trains_stops_and_resumes(files, tmp_path, run_cli):
     (tmp_path / "a.toml").write_text(
         CONFIG.replace('"items"', f'"{files.training[0].parent}"').replace("epochs = 2", "epochs = 60")
@@ -221,8 +251,10 @@ def test_a_remesh_takes_the_metric_of_a_trained_network(files, tmp_path, run_cli
     weights = tmp_path / "run" / WEIGHTS
     result = anisomesh.remesh(surface, n_vertices=150, embedding="neural", weights=weights, max_iterations=20)
     assert result.surface.n_points == 150
-    wanted = predict_metric(result.working, weights)
-    stretch = np.sqrt(np.linalg.eigvalsh(wanted)[:, 2])
+    unit = surface.with_points(unit_frame(surface.points).to_unit(surface.points))
+    found = predict(split_long_edges(unit, max_edge(unit, 150), max_faces=60_000).surface, weights)
+    np.testing.assert_allclose(result.working.points, found.points, atol=1e-6)
+    stretch = np.sqrt(np.linalg.eigvalsh(found.tensors)[:, 2])
     assert stretch.mean() > 1.1
     assert result.embedding.stretch.asked_mean == pytest.approx(stretch.mean(), rel=0.1)
     anisomesh.save(surface, tmp_path / "in.ply")
@@ -230,10 +262,9 @@ def test_a_remesh_takes_the_metric_of_a_trained_network(files, tmp_path, run_cli
     done = run_cli(*words, "--weights", weights)
     assert done.returncode == 0, done.stderr
     assert anisomesh.load(tmp_path / "out.ply").n_points == 100
-    for more, said in (((), "weights of a trained network"), (("--weights", tmp_path / "in.ply"), "safetensors")):
-        done = run_cli(*words, *more)
-        assert done.returncode == 1
-        assert said in done.stderr.strip().splitlines()[-1]
+    done = run_cli(*words, "--weights", tmp_path / "in.ply")
+    assert done.returncode == 1
+    assert "safetensors" in done.stderr.strip().splitlines()[-1]
     with pytest.raises(OptionError, match="takes no other"):
         anisomesh.remesh(surface, n_vertices=150, embedding="neural", weights=weights, metric="uniform")
 
@@ -243,21 +274,26 @@ def test_without_torch_the_error_names_the_extra(tmp_path, torus_obj):
         "import sys; sys.modules['torch'] = None\n"
         "import anisomesh; from anisomesh.errors import AnisomeshError\n"
         f"s = anisomesh.load({str(torus_obj)!r})\n"
-        "print(anisomesh.remesh(s, n_vertices=50, max_iterations=2).surface.n_points)\n"
+        "result = anisomesh.remesh(s, n_vertices=50, max_iterations=2)\n"
+        "print(result.surface.n_points, result.embedded)\n"
         "try: anisomesh.remesh(s, n_vertices=50, embedding='neural', weights='x')\n"
         "except AnisomeshError as error: print(error)\n"
     )
     done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
     first, second = done.stdout.strip().splitlines()
-    assert first == "50"
+    assert first == "50 direct"
     assert 'pip install "anisomesh[learn]"' in second
 
 
 @pytest.mark.parametrize("loss", ["dot", "l2", "cosine"])
-def test_the_network_of_the_paper_learns_too_and_is_no_metric(files, tmp_path, loss):
+def test_the_network_of_the_paper_learns_too_and_embeds(files, tmp_path, loss):
     rows = train(options(tmp_path / "run", epochs=10, rate=1e-2, network=PAPER, loss=loss, noise_share=0.0), files)
     assert rows[-1]["loss"] < 0.9 * rows[0]["loss"]
     network, _ = load_weights(tmp_path / "run" / WEIGHTS)
     assert network.options == PAPER
-    with pytest.raises(WeightsError, match="gives no metric"):
-        predict_metric(load_item(files.validation[0]).surface, tmp_path / "run" / WEIGHTS)
+    weights = tmp_path / "run" / WEIGHTS
+    result = anisomesh.remesh(
+        load_item(files.validation[0]).surface, n_vertices=100, embedding="neural", weights=weights, max_iterations=10
+    )
+    assert result.surface.n_points == 100
+    np.testing.assert_allclose(result.embedding.points[:, 3:], predict(result.working, weights).extra, atol=1e-4)

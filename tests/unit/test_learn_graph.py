@@ -8,7 +8,12 @@ import pytest
 torch = pytest.importorskip("torch")
 
 from anisomesh.learn.graph import graph_of, hierarchy  # noqa: E402
-from anisomesh.learn.messages import largest_by_scatter, largest_of_neighbours  # noqa: E402
+from anisomesh.learn.messages import (  # noqa: E402
+    largest_by_scatter,
+    largest_of_neighbours,
+    mean_by_scatter,
+    mean_of_neighbours,
+)
 from anisomesh.surface.mesh import Surface  # noqa: E402
 from anisomesh.surface.shapes import open_patch, sphere, torus  # noqa: E402
 
@@ -58,6 +63,25 @@ def test_derivatives_of_the_kernel_are_those_of_plain_torch():
     for a, b in zip(mine, theirs, strict=True):
         torch.testing.assert_close(a, b)
     assert all(grad.abs().sum() > 0 for grad in mine)
+
+
+@pytest.mark.parametrize("seed", range(3))
+def test_mean_messages_and_their_derivatives_are_those_of_brute_force_and_plain_torch(seed):
+    graph = random_graph(seed=seed)
+    own, sent, weight = torch.randn(40, 7), torch.randn(40, 7), torch.randn(3, 7)
+    found = mean_of_neighbours(own, sent, weight, graph, 0.1)
+    for i in range(40):
+        edges = range(graph.first[i], graph.first[i + 1])
+        messages = [own[i] + sent[graph.neighbour[e]] + torch.from_numpy(graph.along[e]) @ weight for e in edges]
+        leaky = [torch.where(message > 0.0, message, 0.1 * message) for message in messages]
+        torch.testing.assert_close(found[i], torch.stack(leaky).mean(dim=0) if leaky else torch.zeros(7))
+    inputs = [value.requires_grad_() for value in (own, sent, weight)]
+    towards = torch.randn(40, 7)
+    mine = torch.autograd.grad(mean_of_neighbours(*inputs, graph, 0.1), inputs, towards)
+    theirs = torch.autograd.grad(mean_by_scatter(*inputs, graph, 0.1), inputs, towards)
+    for a, b in zip(mine, theirs, strict=True):
+        torch.testing.assert_close(a, b, rtol=1e-4, atol=1e-5)
+        assert a.abs().sum() > 0.0
 
 
 def test_derivatives_agree_with_differences():

@@ -5,15 +5,19 @@ import pytest
 
 torch = pytest.importorskip("torch")
 
+from anisomesh.learn.config import TrainingOptions  # noqa: E402
 from anisomesh.learn.examples import example_of  # noqa: E402
 from anisomesh.learn.items import Item  # noqa: E402
-from anisomesh.learn.lines import MOST, directions_of, line_loss, lines_in, tensors_of  # noqa: E402
+from anisomesh.learn.lines import MOST, directions_of, lines_in, tensors_of  # noqa: E402
+from anisomesh.learn.losses import line_loss, offset_loss  # noqa: E402
 from anisomesh.learn.network import NetworkOptions, StretchNetwork  # noqa: E402
 from anisomesh.learn.pyramid import N_EDGE, N_NODE, pyramid  # noqa: E402
+from anisomesh.learn.tasks import StretchTask  # noqa: E402
 from anisomesh.metric.curvature import principal_curvatures  # noqa: E402
 from anisomesh.metric.tangent import tangent_frames  # noqa: E402
 from anisomesh.metric.tensor import curvature_metric  # noqa: E402
 from anisomesh.surface.mesh import Surface  # noqa: E402
+from anisomesh.surface.noise import NOISES, with_noise  # noqa: E402
 from anisomesh.surface.shapes import ellipsoid, open_patch, sphere, torus  # noqa: E402
 
 SMALL = NetworkOptions(channels=16, scales=3, blocks=1, heads=2)
@@ -39,7 +43,8 @@ def moved(surface, seed=1):
 def predicted(network, surface):
     seen = pyramid(surface, network.options.scales)
     with torch.no_grad():
-        return tensors_of(network(seen).numpy(), seen.frames)
+        found = network(seen)
+    return tensors_of(found.lines.numpy(), seen.frames), found.offsets.numpy()
 
 
 def egg_item():
@@ -80,7 +85,7 @@ def test_values_of_nodes_and_edges_are_those_of_the_shape(surface):
     assert finest.graph.along.shape == (2 * len(surface.edges), N_EDGE)
     if surface.n_points == sphere(3).n_points:
         radius = 1.0 / (2.0 * np.sqrt(3.0))
-        np.testing.assert_allclose(finest.graph.along[:, 1:], np.arcsinh(1.0 / radius), rtol=0.1)
+        np.testing.assert_allclose(finest.graph.along[:, 1:4], np.arcsinh(1.0 / radius), rtol=0.1)
         assert np.median(finest.graph.along[:, 1]) == pytest.approx(np.arcsinh(1.0 / radius), rel=0.01)
     length = np.linalg.norm(finest.turns, axis=1)
     np.testing.assert_allclose(length, 1.0, atol=1e-6)
@@ -97,7 +102,7 @@ def test_what_the_network_sees_does_not_change_with_order_or_motion():
 
 
 @pytest.mark.parametrize("surface", [torus(n_major=40, n_minor=16), open_patch(lambda x, y: 0.3 * x * y, n=15)])
-def test_the_metric_turns_with_the_mesh_and_ignores_the_order(surface):
+def test_metric_and_offsets_turn_with_the_mesh_and_ignore_the_order(surface):
     torch.manual_seed(0)
     network = StretchNetwork(SMALL).eval()
     for block in network.modules():
@@ -105,9 +110,12 @@ def test_the_metric_turns_with_the_mesh_and_ignores_the_order(surface):
             torch.nn.init.normal_(block.out.weight, std=0.1)
     surface = shaken(surface)
     other, order, turn = moved(surface)
-    mine, theirs = predicted(network, surface), predicted(network, other)
+    (mine, my_offsets), (theirs, their_offsets) = predicted(network, surface), predicted(network, other)
     assert np.ptp(np.linalg.eigvalsh(mine)[:, 2]) > 0.1
     np.testing.assert_allclose(theirs, turn @ mine[order] @ turn.T, rtol=1e-3, atol=1e-3)
+    size = np.linalg.norm(my_offsets, axis=1).max()
+    assert size > 0.0
+    np.testing.assert_allclose(their_offsets, my_offsets[order] @ turn.T, atol=1e-3 * size)
 
 
 def test_noise_moves_the_mesh_and_not_the_lines_wanted():
@@ -125,15 +133,46 @@ def test_noise_moves_the_mesh_and_not_the_lines_wanted():
     torch.testing.assert_close(again.lines, noisy.lines)
 
 
+@pytest.mark.parametrize("kind", NOISES)
+def test_the_offsets_wanted_take_the_noise_away(kind):
+    item = egg_item()
+    rng, again = np.random.default_rng(0), np.random.default_rng(0)
+    example = example_of(item, 3, 0.3, rng, kind)
+    noisy = with_noise(item.surface, 0.3, again, kind)
+    away = np.linalg.norm(noisy.points - item.surface.points, axis=1)
+    deviation = {"independent": 0.3 * np.sqrt(3.0), "normal": 0.3, "smooth": 0.15 * np.sqrt(3.0)}[kind]
+    assert np.sqrt((away**2).mean()) == pytest.approx(deviation * example.unit, rel=0.15)
+    np.testing.assert_allclose(noisy.points + example.unit * example.offsets.numpy(), item.points, atol=1e-6)
+    height = np.einsum("nx,nx->n", noisy.points - item.surface.points, item.surface.point_normals)
+    seen = torch.einsum("vi,vij,vj->v", example.offsets, example.quadrics, example.offsets).sqrt().numpy()
+    np.testing.assert_allclose(seen * example.unit, np.abs(height), atol=0.15 * away.max())
+
+
+def test_the_loss_of_offsets_is_zero_for_the_answer_and_for_motion_along_a_plane():
+    rng = np.random.default_rng(0)
+    wanted = torch.from_numpy(rng.normal(size=(4, 3)).astype(np.float32))
+    up = torch.diag(torch.tensor([0.0, 0.0, 1.0])).expand(4, 3, 3)
+    edges, weight = torch.tensor([[0, 1], [1, 2], [2, 3]]), torch.full((4,), 0.25)
+    along = wanted + torch.tensor([3.0, -2.0, 0.0])
+    for offsets in (wanted, along):
+        assert float(offset_loss(offsets, wanted, up, edges, weight)) == pytest.approx(0.0, abs=1e-6)
+    raised = wanted + torch.tensor([0.0, 0.0, 1.0])
+    assert float(offset_loss(raised, wanted, up, edges, weight)) == pytest.approx(1.0, abs=0.03)
+    rough = wanted + torch.tensor([[0.0, 0.0, 1.0], [0.0, 0.0, -1.0]] * 2)
+    assert float(offset_loss(rough, wanted, up, edges, weight)) == pytest.approx(3.0, abs=0.05)
+
+
 def test_a_network_learns_one_shape():
     torch.manual_seed(0)
-    network = StretchNetwork(SMALL)
-    example = example_of(egg_item(), SMALL.scales)
-    nothing = float(line_loss(torch.zeros_like(example.lines), example.lines, example.weight))
+    task = StretchTask(TrainingOptions(data="", out="", network=SMALL))
+    network = task.network()
+    clean, noisy = (task.example(egg_item(), noise, np.random.default_rng(0), training=False) for noise in (0.0, 0.3))
+    nothing = [task.losses_of_nothing(clean)["lines"], task.losses_of_nothing(noisy)["offsets"]]
     optimiser = torch.optim.AdamW(network.parameters(), lr=5e-3)
     for _ in range(60):
         optimiser.zero_grad()
-        loss = line_loss(network(example.pyramid), example.lines, example.weight)
-        loss.backward()
+        losses = [task.losses(network, clean)["lines"], task.losses(network, noisy)["offsets"]]
+        sum(losses).backward()
         optimiser.step()
-    assert float(loss.detach()) < 0.25 * nothing
+    assert float(losses[0].detach()) < 0.3 * nothing[0]
+    assert float(losses[1].detach()) < 0.7 * nothing[1]

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import numpy.typing as npt
 
-from anisomesh._kernels.compiled import allocating, kernel
+from anisomesh._kernels.compiled import allocating, inlined, kernel
 
 Floats = npt.NDArray[np.float32]
 Ints = npt.NDArray[np.int32]
@@ -83,3 +83,87 @@ def spread_back(
                 for k in range(along.shape[1]):
                     to_weight[k, c] += g * along[e, k]
                     to_along[e, k] += g * weight[k, c]
+
+
+@inlined
+def _write_message(own: Floats, sent: Floats, along: Floats, weight: Floats, message: Floats) -> None:
+    """Write own + sent + along weight, from rows (C,), (C,), (K,) and weights (K, C)."""
+    for c in range(len(message)):
+        message[c] = own[c] + sent[c]
+    for k in range(len(along)):
+        value = along[k]
+        for c in range(len(message)):
+            message[c] += value * weight[k, c]
+
+
+@allocating
+def mean_messages(
+    first: Ints, neighbour: Ints, own: Floats, sent: Floats, along: Floats, weight: Floats, slope: float, mean: Floats
+) -> None:
+    """Write the mean over the edges e of each node i of leaky(own[i] + sent[neighbour[e]] + along[e] weight).
+
+    Parameters
+    ----------
+    first, neighbour, sent, along, weight
+        As in :func:`largest_messages`.
+    own
+        What each node adds to the messages that it gets (V, C).
+    slope
+        Of the leaky rectifier below zero.
+    mean
+        Room for the result (V, C); 0 for a node without an edge.
+    """
+    channels = sent.shape[1]
+    message = np.empty(channels, dtype=np.float32)
+    below = np.float32(slope)
+    for i in range(len(first) - 1):
+        for c in range(channels):
+            mean[i, c] = 0.0
+        share = np.float32(1.0 / max(first[i + 1] - first[i], 1))
+        for e in range(first[i], first[i + 1]):
+            j = neighbour[e]
+            _write_message(own[i], sent[j], along[e], weight, message)
+            for c in range(channels):
+                mean[i, c] += share * max(message[c], below * message[c])
+
+
+@allocating
+def mean_back(
+    first: Ints,
+    neighbour: Ints,
+    own: Floats,
+    sent: Floats,
+    along: Floats,
+    weight: Floats,
+    slope: float,
+    gradient: Floats,
+    to_own: Floats,
+    to_sent: Floats,
+    to_weight: Floats,
+) -> None:
+    """Add the derivatives of :func:`mean_messages` to ``to_own`` (V, C), ``to_sent`` (V, C), ``to_weight`` (K, C).
+
+    Parameters
+    ----------
+    first, neighbour, own, sent, along, weight, slope
+        As there.
+    gradient
+        Of the result (V, C).
+    """
+    channels = sent.shape[1]
+    message = np.empty(channels, dtype=np.float32)
+    below = np.float32(slope)
+    for i in range(len(first) - 1):
+        share = np.float32(1.0 / max(first[i + 1] - first[i], 1))
+        for e in range(first[i], first[i + 1]):
+            j = neighbour[e]
+            _write_message(own[i], sent[j], along[e], weight, message)
+            for c in range(channels):
+                g = share * gradient[i, c] * (np.float32(1.0) if message[c] > 0.0 else below)
+                message[c] = g
+                to_own[i, c] += g
+                to_sent[j, c] += g
+            for k in range(along.shape[1]):
+                value = along[e, k]
+                for c in range(channels):
+                    to_weight[k, c] += value * message[c]

@@ -14,7 +14,7 @@ from anisomesh.cli.progress import announce_compilation, progress
 from anisomesh.cli.report import counted, table
 
 if TYPE_CHECKING:
-    from anisomesh.dataset.build import Row
+    from anisomesh.learn.manifest import Row
 
 
 class Evening(StrEnum):
@@ -57,8 +57,8 @@ def build_command(
 @app.command("info")
 def info_command(folder: Annotated[Path, typer.Argument(metavar="DATASET", help="Folder of a data set.")]) -> None:
     """Say what is in a data set, and what was left out of it and why."""
-    from anisomesh.dataset.build import MANIFEST, read_manifest
     from anisomesh.errors import MeshFileError
+    from anisomesh.learn.manifest import MANIFEST, read_manifest
 
     rows = read_manifest(folder)
     if not rows:

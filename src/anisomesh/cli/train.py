@@ -4,18 +4,18 @@ from __future__ import annotations
 
 import sys
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import Annotated, Any
 
 import typer
 
 from anisomesh.cli.report import counted
 
-if TYPE_CHECKING:
-    from anisomesh.learn.train import Files
-
 
 def command(
-    config: Annotated[Path, typer.Argument(metavar="CONFIG", help="Training run as a TOML file.")],
+    config: Annotated[
+        Path,
+        typer.Argument(metavar="CONFIG", help="Training run as a TOML file, or the name of a shipped one: default."),
+    ],
     resume: Annotated[bool, typer.Option("--resume", help="Go on from the checkpoint of the run.")] = False,
     threads: Annotated[int, typer.Option("--threads", min=1, help="Worker threads of torch.")] = 1,
     quiet: Annotated[bool, typer.Option("--quiet", "-q", help="No progress.")] = False,
@@ -27,39 +27,17 @@ def command(
     import torch
 
     from anisomesh.learn.config import load_training
+    from anisomesh.learn.manifest import files_of
     from anisomesh.learn.train import WEIGHTS, train
 
     torch.set_num_threads(threads)
     options = load_training(config)
-    files = _files(Path(options.data))
+    files = files_of(Path(options.data))
     if not quiet:
         counts = counted(len(files.training), "training item"), counted(len(files.validation), "validation item")
         print(f"{counts[0]}, {counts[1]}", file=sys.stderr, flush=True)
     rows = train(options, files, resume=resume, on_row=lambda row: None if quiet else _print(row))
     typer.echo(f"{counted(len(rows), 'epoch')}; wrote {Path(options.out) / WEIGHTS}")
-
-
-def _files(data: Path) -> Files:
-    """Return the items of a data set.
-
-    Raises
-    ------
-    MeshFileError
-        If there is no data set.
-    """
-    from anisomesh.dataset.build import MANIFEST, read_manifest
-    from anisomesh.errors import MeshFileError
-    from anisomesh.learn.train import Files
-
-    rows = [row for row in read_manifest(data) if row["status"] == "kept"]
-    if not rows:
-        raise MeshFileError(
-            f"{data}: there is no data set here (no {MANIFEST} with items); anisomesh dataset build makes one"
-        )
-    found: dict[str, list[Path]] = {"training": [], "validation": []}
-    for row in rows:
-        found[row["split"]] += [data / item["file"] for item in row["items"]]
-    return Files(**found)
 
 
 def _print(row: dict[str, Any]) -> None:

@@ -9,22 +9,19 @@ from collections.abc import Callable, Iterator
 from concurrent.futures import FIRST_COMPLETED, Future, ThreadPoolExecutor, wait
 from dataclasses import asdict, dataclass
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 
 from anisomesh.dataset.implicit import Blobs
 from anisomesh.dataset.make import Made, Recipe, UnsuitableError, items_of_blobs, items_of_mesh
-from anisomesh.errors import AnisomeshError, MeshFileError, OptionError
+from anisomesh.errors import AnisomeshError, OptionError
 from anisomesh.isolation import isolated
 from anisomesh.learn.items import save_item
+from anisomesh.learn.manifest import MANIFEST, Row, read_manifest
 from anisomesh.surface.files import append_line, drop_cut_line
 from anisomesh.surface.io import FORMATS, load
 
-MANIFEST = "manifest.jsonl"
 _VERSION = 1  # of the items; another one makes a build start anew
-
-Row = dict[str, Any]
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -138,30 +135,6 @@ def build(
         append_line(out / MANIFEST, json.dumps(known[source.name], allow_nan=False))
         on_row(known[source.name], number, len(jobs))
     return [{**known[name], "split": start["split"]} for name, start in starts.items()]
-
-
-def read_manifest(folder: Path) -> list[Row]:
-    """Return the rows of a data set, the last one of each source; none if there is no list.
-
-    Raises
-    ------
-    MeshFileError
-        If a line but the last is no row. (The last may have been cut off when a build was killed.)
-    """
-    path = folder / MANIFEST
-    lines = path.read_text(encoding="utf-8").split("\n") if path.exists() else []
-    rows: dict[str, Row] = {}
-    for number, line in enumerate(lines, 1):
-        if not line:
-            continue
-        try:
-            row = json.loads(line)
-            rows[row["name"]] = row
-        except (json.JSONDecodeError, KeyError, TypeError) as error:
-            if number == len(lines):
-                break
-            raise MeshFileError(f"{path}, line {number}: no row of a data set; move the file away") from error
-    return list(rows.values())
 
 
 def _start(source: Source, recipe: Recipe, validation: float) -> Row:

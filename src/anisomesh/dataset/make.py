@@ -18,6 +18,7 @@ from anisomesh.learn.items import Item
 from anisomesh.metric.curvature import Curvature, principal_curvatures
 from anisomesh.metric.tensor import curvature_metric, metric_root
 from anisomesh.pipeline import remesh
+from anisomesh.retriangulate import with_random_triangles
 from anisomesh.surface.closest import ClosestPoints
 from anisomesh.surface.geometry import Frame, thickness, unit_frame
 from anisomesh.surface.mesh import Surface
@@ -28,7 +29,6 @@ _REGULAR = 0.4330127  # thickness of an equilateral triangle
 _COUNTS = (0.6, 1.6)  # of the wanted number of points that a mesh may have without being made anew
 _EVEN = 0.7  # mean thickness, as a share of the regular one, from which on a mesh is even
 _DECIMATED, _STRETCHED = (0.35, 0.75), (0.5, 1.0)  # of the points that such variants have
-_RATIOS = (2.0, 5.0)  # of the sides of stretched triangles
 _SECONDS = 120.0  # for a remesh
 
 MetricOn = Callable[[Surface], tuple[PointTensors, PointMask]]
@@ -191,13 +191,7 @@ def _decimated(clean: Surface, rng: np.random.Generator) -> Surface:
 
 
 def _stretched(clean: Surface, rng: np.random.Generator) -> Surface:
-    direction = rng.normal(size=3)
-    direction /= np.linalg.norm(direction)
-    square = rng.uniform(*_RATIOS) ** 2
-    tensor = np.eye(3) + (square - 1.0) * np.outer(direction, direction)
-    n = round(rng.uniform(*_STRETCHED) * clean.n_points)
-    tensors = np.tile(tensor, (clean.n_points, 1, 1))
-    return remesh(clean, n_vertices=n, metric=tensors, threads=1, time_limit=_SECONDS).surface
+    return with_random_triangles(clean, round(rng.uniform(*_STRETCHED) * clean.n_points), rng)
 
 
 def _settling(blobs: Blobs, frame: Frame) -> Callable[[Points], Points]:

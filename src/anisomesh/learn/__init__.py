@@ -1,10 +1,17 @@
 """Learning the metric: items, graphs, the network, its training. Only modules of this package import torch."""
 
+import importlib.util
+
 from anisomesh.errors import AnisomeshError
 
 
 class LearningError(AnisomeshError):
     """What learning needs is not installed."""
+
+
+def torch_is_there() -> bool:
+    """Return whether what a trained network needs is installed, without loading it."""
+    return all(importlib.util.find_spec(name) is not None for name in ("torch", "safetensors"))
 
 
 def require_torch() -> None:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import MISSING, dataclass, field, fields
+from dataclasses import MISSING, dataclass, field, fields, replace
 from pathlib import Path
 from typing import Any
 
@@ -10,6 +10,7 @@ from anisomesh.errors import OptionError
 from anisomesh.learn.losses import LOSSES
 from anisomesh.learn.network import NetworkOptions
 from anisomesh.learn.paper import PaperOptions
+from anisomesh.learn.shipped import configuration_path, configurations, shipped_weights
 from anisomesh.toml import check_keys, read_toml
 
 
@@ -21,6 +22,8 @@ class TrainingOptions:
     ----------
     data, out
         Folder of the data set, and of what the run writes.
+    start
+        Weights to start from, a file or the name of a shipped network; random ones without.
     epochs
         Times that every training item is seen.
     batch
@@ -36,6 +39,8 @@ class TrainingOptions:
         Of the weights, the order of the items and the noise.
     minutes
         Between checkpoints.
+    device
+        ``"auto"``: a GPU where there is one, else the CPU; or as torch names it.
     network
         Kind and sizes of the network; in a file the table ``[network]`` has the sizes of the default network, the table
         ``[paper]`` in its place those of the paper's.
@@ -46,6 +51,7 @@ class TrainingOptions:
 
     data: str
     out: str
+    start: str = ""
     epochs: int = 30
     batch: int = 4
     rate: float = 2e-3
@@ -56,6 +62,7 @@ class TrainingOptions:
     noise_share: float = 0.5
     seed: int = 0
     minutes: float = 5.0
+    device: str = "auto"
     network: NetworkOptions | PaperOptions = field(default_factory=NetworkOptions)
     loss: str = "dot"
     laplacian: float = 0.1
@@ -81,21 +88,35 @@ class TrainingOptions:
 def load_training(path: str | Path) -> TrainingOptions:
     """Return the training run that a TOML file describes; its folders are relative to that of the file.
 
+    The name of a training that comes with the package stands for its file, and folders are relative to the current one.
+
     Raises
     ------
     OptionError
         If the file cannot be read, or a key is unknown, missing, or has a value of the wrong kind.
     """
-    path = Path(path)
-    table = read_toml(path)
+    path, folder = Path(path), Path(path).parent
+    if str(path) in configurations():
+        path, folder = configuration_path(str(path)), Path()
+    options = parse_training(str(path), read_toml(path))
+    start = options.start if options.start in ("", *shipped_weights()) else str(folder / options.start)
+    return replace(options, data=str(folder / options.data), out=str(folder / options.out), start=start)
+
+
+def parse_training(where: str, table: dict[str, Any]) -> TrainingOptions:
+    """Return the training run that a table describes; ``where`` it is from is said in errors.
+
+    Raises
+    ------
+    OptionError
+        If a key is unknown, missing, or has a value of the wrong kind.
+    """
     if "network" in table and "paper" in table:
-        raise OptionError(f"{path}: give either [network] or [paper]")
+        raise OptionError(f"{where}: give either [network] or [paper]")
     name, kind = ("paper", PaperOptions) if "paper" in table else ("network", NetworkOptions)
-    sizes = _values(f"{path}: [{name}]", kind, table.pop(name, {}))
-    values = _values(str(path), TrainingOptions, table)
-    for name in ("data", "out"):
-        values[name] = str(path.parent / values[name])
-    return TrainingOptions(**values, network=kind(**sizes))
+    rest = {key: value for key, value in table.items() if key != name}
+    sizes = _values(f"{where}: [{name}]", kind, table.get(name, {}))
+    return TrainingOptions(**_values(where, TrainingOptions, rest), network=kind(**sizes))
 
 
 def _values(where: str, kind: type, table: Any) -> dict[str, Any]:

@@ -1,10 +1,11 @@
-"""Training examples: items with noise, as pyramids, with the lines that a network is to find on them."""
+"""Training examples: items with noise, as pyramids, with the lines and offsets that a network is to find on them."""
 
 from __future__ import annotations
 
 from dataclasses import dataclass
 
 import numpy as np
+import numpy.typing as npt
 import torch
 from torch import Tensor
 
@@ -12,20 +13,50 @@ from anisomesh.learn.items import Item
 from anisomesh.learn.lines import directions_of, lines_in
 from anisomesh.learn.pyramid import Pyramid, pyramid
 from anisomesh.surface.mesh import Surface
+from anisomesh.surface.noise import Noise, with_noise
 
 _UNTRUSTED = 0.1  # weight of points whose curvature is not known well
 
 
 @dataclass(frozen=True, eq=False)
 class Example:
-    """A mesh as the network sees it, the lines wanted (N, 2), and the weights of its points (N,), sum 1."""
+    """A mesh as the network sees it, and what is wanted of it.
+
+    Attributes
+    ----------
+    pyramid
+        Graphs of the mesh of N points and E edges.
+    lines
+        Lines of the clean shape (N, 2).
+    offsets
+        To the points of the clean shape (N, 3), in mean edge lengths.
+    quadrics
+        Mean n n^t over the normals of the clean triangles at each point (N, 3, 3): along the others an offset does not
+        matter.
+    edges
+        Edges (E, 2).
+    weight
+        Of the points (N,), sum 1.
+    unit
+        Mean edge length of the clean mesh.
+    """
 
     pyramid: Pyramid
     lines: Tensor
+    offsets: Tensor
+    quadrics: Tensor
+    edges: Tensor
     weight: Tensor
+    unit: float
 
 
-def example_of(item: Item, n_scales: int, noise: float = 0.0, rng: np.random.Generator | None = None) -> Example:
+def example_of(
+    item: Item,
+    n_scales: int,
+    noise: float = 0.0,
+    rng: np.random.Generator | None = None,
+    kind: Noise = "independent",
+) -> Example:
     """Return an example.
 
     Parameters
@@ -35,26 +66,35 @@ def example_of(item: Item, n_scales: int, noise: float = 0.0, rng: np.random.Gen
     n_scales
         Graphs of the pyramid.
     noise
-        Standard deviation of the noise that is added to every coordinate, in mean edge lengths. The lines wanted are
-        still those of the clean shape.
+        Its deviation, in mean edge lengths. What is wanted is still that of the clean shape.
     rng
         Of the noise.
+    kind
+        See :func:`anisomesh.surface.noise.with_noise`.
     """
     clean = item.surface
+    noisy = clean if rng is None else with_noise(clean, noise, rng, kind)
     directions, logarithms = directions_of(item.tensors)
-    scales = pyramid(clean if rng is None else with_noise(clean, noise, rng), n_scales)
-    area = np.bincount(clean.faces.ravel(), np.repeat(clean.face_areas, 3), minlength=clean.n_points)
+    scales = pyramid(noisy, n_scales)
+    area = _at_points(clean, clean.face_areas)
+    normals = clean.face_normals
+    quadrics = _at_points(clean, clean.face_areas[:, None, None] * normals[:, :, None] * normals[:, None, :])
     weight = area * np.where(item.trusted, 1.0, _UNTRUSTED)
+    unit = float(clean.edge_lengths.mean())
     return Example(
         pyramid=scales,
         lines=torch.from_numpy(lines_in(scales.frames, directions, logarithms)),
+        offsets=torch.from_numpy(((clean.points - noisy.points) / unit).astype(np.float32)),
+        quadrics=torch.from_numpy((quadrics / np.maximum(area, 1e-30)[:, None, None]).astype(np.float32)),
+        edges=torch.from_numpy(clean.edges.astype(np.int64)),
         weight=torch.from_numpy((weight / weight.sum()).astype(np.float32)),
+        unit=unit,
     )
 
 
-def with_noise(surface: Surface, noise: float, rng: np.random.Generator) -> Surface:
-    """Return a surface with noise of this deviation, in mean edge lengths, added to every coordinate."""
-    if noise == 0.0:
-        return surface
-    size = noise * float(surface.edge_lengths.mean())
-    return surface.with_points(surface.points + rng.normal(0.0, size, surface.points.shape))
+def _at_points(surface: Surface, values: npt.NDArray[np.float64]) -> npt.NDArray[np.float64]:
+    """Return the sums of values of faces (F, ...) at the points of their corners (V, ...)."""
+    flat = np.repeat(values.reshape(surface.n_faces, -1), 3, axis=0)
+    corners = surface.faces.ravel()
+    sums = [np.bincount(corners, column, minlength=surface.n_points) for column in flat.T]
+    return np.stack(sums, axis=1).astype(np.float64).reshape(surface.n_points, *values.shape[1:])

@@ -1,4 +1,4 @@
-"""Lines of stretch: what the network predicts, from and to metric tensors, and how far two fields of them are apart."""
+"""Lines of stretch: what the network predicts, from and to metric tensors."""
 
 from __future__ import annotations
 
@@ -6,13 +6,10 @@ from typing import Any
 
 import numpy as np
 import numpy.typing as npt
-import torch
-from torch import Tensor
 
 from anisomesh._arrays import PointTensors, PointVectors
 from anisomesh.metric.tangent import line_field, line_tensors
 
-_ROUND = 0.05  # of the logarithm: errors below it count squared, larger ones in proportion
 MOST = float(np.log(400.0))  # the logarithm of the largest squared stretch
 
 Frames = npt.NDArray[np.float64]
@@ -38,10 +35,3 @@ def tensors_of(lines: npt.NDArray[Any], frames: Frames) -> PointTensors:
     field = lines[:, 0].astype(np.float64) + 1j * lines[:, 1].astype(np.float64)
     square = np.exp(np.minimum(np.abs(field), MOST))
     return np.asarray(np.eye(3) + (square - 1.0)[:, None, None] * line_tensors(field, frames))
-
-
-def line_loss(predicted: Tensor, wanted: Tensor, weight: Tensor) -> Tensor:
-    """Return the weighted mean distance of lines (N, 2) to those wanted (N, 2), rounded off at zero; weights (N,)."""
-    square = ((predicted - wanted) ** 2).sum(dim=1)
-    distance = torch.sqrt(square + _ROUND**2) - _ROUND
-    return (weight * distance).sum() / torch.clamp(weight.sum(), min=1e-30)

@@ -1,4 +1,4 @@
-"""Losses of embeddings: dot products at corners (the paper's), Laplacian, and those that it is compared with."""
+"""Losses: of embeddings (dot products at corners as in the paper, Laplacian, others), of lines and of offsets."""
 
 from __future__ import annotations
 
@@ -6,6 +6,9 @@ from typing import Literal
 
 import torch
 from torch import Tensor
+
+_ROUND_LINES = 0.05  # of the logarithm: errors below it count squared, larger ones in proportion
+_ROUND = 0.02  # mean edge lengths: errors of offsets below it count squared, larger ones in proportion
 
 LossName = Literal["dot", "l2", "cosine"]
 LOSSES: tuple[LossName, ...] = ("dot", "l2", "cosine")
@@ -73,3 +76,42 @@ def _laplacian(values: Tensor, edges: Tensor) -> Tensor:
         torch.zeros(len(values), dtype=values.dtype, device=values.device).index_add(0, a, ones).index_add(0, b, ones)
     )
     return total / count.clamp(min=1.0)[:, None] - values
+
+
+def line_loss(predicted: Tensor, wanted: Tensor, weight: Tensor) -> Tensor:
+    """Return the weighted mean distance of lines (N, 2) to those wanted (N, 2), rounded off at zero; weights (N,)."""
+    square = ((predicted - wanted) ** 2).sum(dim=1)
+    distance = torch.sqrt(square + _ROUND_LINES**2) - _ROUND_LINES
+    return (weight * distance).sum() / torch.clamp(weight.sum(), min=1e-30)
+
+
+def offset_loss(offsets: Tensor, wanted: Tensor, quadrics: Tensor, edges: Tensor, weight: Tensor) -> Tensor:
+    """Return how far points are from the surface wanted, and how rough they are over it.
+
+    Parameters
+    ----------
+    offsets, wanted
+        Of the points (V, 3), in mean edge lengths.
+    quadrics
+        Mean n n^t over the normals at each point (V, 3, 3); along other directions an error does not matter.
+    edges
+        Edges (E, 2), each once.
+    weight
+        Of the points (V,), sum 1.
+
+    Notes
+    -----
+    The mean of the error in the quadric, and the mean over the edges of the error's difference at their ends, both
+    rounded off at zero. The second is what turns triangles away from the surface.
+    """
+    error = offsets - wanted
+    far = _rounded(torch.einsum("vi,vij,vj->v", error, quadrics, error))
+    a, b = edges[:, 0], edges[:, 1]
+    difference = error[a] - error[b]
+    rough = _rounded(torch.einsum("ei,eij,ej->e", difference, 0.5 * (quadrics[a] + quadrics[b]), difference))
+    share = weight[a] + weight[b]
+    return (weight * far).sum() + (share * rough).sum() / share.sum().clamp(min=1e-30)
+
+
+def _rounded(square: Tensor) -> Tensor:
+    return torch.sqrt(square.clamp(min=0.0) + _ROUND**2) - _ROUND

@@ -1,4 +1,4 @@
-"""The fused neighbour kernel as a function of torch."""
+"""The fused neighbour kernels as functions of torch."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ import torch
 from torch import Tensor
 from torch.autograd.function import once_differentiable
 
-from anisomesh._kernels.messages import largest_messages, spread_back
+from anisomesh._kernels.messages import largest_messages, mean_back, mean_messages, spread_back
 from anisomesh.learn.graph import Graph
 
 
@@ -72,3 +72,65 @@ def largest_by_scatter(sent: Tensor, weight: Tensor, graph: Graph, along: Tensor
     index = edges.node[:, None].expand_as(messages)
     largest = start.scatter_reduce(0, index, messages, "amax", include_self=True)
     return torch.where(torch.isinf(largest), torch.zeros_like(largest), largest)
+
+
+class _MeanMessages(torch.autograd.Function):
+    """See :func:`mean_of_neighbours`; on the CPU one pass over the edges, with no table of messages."""
+
+    @staticmethod
+    def forward(context: Any, own: Tensor, sent: Tensor, weight: Tensor, graph: Graph, slope: float) -> Tensor:
+        own, sent, weight = (value.detach().contiguous() for value in (own, sent, weight))
+        mean = torch.empty((graph.n_nodes, sent.shape[1]), dtype=torch.float32)
+        arrays = [value.numpy() for value in (own, sent, weight, mean)]
+        mean_messages(graph.first, graph.neighbour, *arrays[:2], graph.along, arrays[2], slope, arrays[3])
+        context.graph, context.slope = graph, slope
+        context.save_for_backward(own, sent, weight)
+        return mean
+
+    @staticmethod
+    @once_differentiable
+    def backward(context: Any, gradient: Tensor) -> tuple[Tensor | None, ...]:
+        graph, saved = context.graph, context.saved_tensors
+        found = tuple(torch.zeros_like(value) for value in saved)
+        own, sent, weight = (value.numpy() for value in saved)
+        into = (value.numpy() for value in found)
+        table = gradient.contiguous().numpy()
+        mean_back(graph.first, graph.neighbour, own, sent, graph.along, weight, context.slope, table, *into)
+        return (*found, None, None)
+
+
+def mean_of_neighbours(own: Tensor, sent: Tensor, weight: Tensor, graph: Graph, slope: float) -> Tensor:
+    """Return the mean of the messages that each node gets, each through a leaky rectifier.
+
+    Parameters
+    ----------
+    own
+        What each node adds to the messages that it gets (V, C), float32.
+    sent
+        What each node sends (V, C).
+    weight
+        What the values of an edge add to each channel (K, C).
+    graph
+        The nodes and their edges, with K values each.
+    slope
+        Of the rectifier below zero.
+
+    Returns
+    -------
+    Tensor
+        (V, C): mean over the edges e from i to j of leaky(own[i] + sent[j] + along[e] weight); 0 for a node without an
+        edge.
+    """
+    if sent.device.type == "cpu":
+        mean: Tensor = _MeanMessages.apply(own, sent, weight, graph, slope)  # type: ignore[no-untyped-call]
+        return mean
+    return mean_by_scatter(own, sent, weight, graph, slope)
+
+
+def mean_by_scatter(own: Tensor, sent: Tensor, weight: Tensor, graph: Graph, slope: float) -> Tensor:
+    """Return the same by plain operations of torch, on any device."""
+    edges = graph.edges_on(sent.device)
+    messages = own[edges.node] + sent[edges.neighbour] + edges.along @ weight
+    total = torch.zeros_like(own).index_add(0, edges.node, torch.nn.functional.leaky_relu(messages, slope))
+    count = torch.bincount(edges.node, minlength=graph.n_nodes).clamp(min=1)
+    return total / count[:, None]

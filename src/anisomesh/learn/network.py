@@ -1,19 +1,22 @@
-"""The default network: from a pyramid of graphs to the line along which a remesh is to be stretched at every point."""
+"""The default network: from a pyramid of graphs to lines of stretch, and to where the points are without noise."""
 
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import NamedTuple
 
 import torch
 from torch import Tensor, nn
 
 from anisomesh.learn.graph import Graph
-from anisomesh.learn.messages import largest_of_neighbours
-from anisomesh.learn.pyramid import N_EDGE, N_NODE, Pyramid, Scale
+from anisomesh.learn.messages import mean_of_neighbours
+from anisomesh.learn.pyramid import N_EDGE, N_NODE, N_NORMALS, Pyramid, Scale
 
 _EPSILON = 1e-5
 _INPUT_SCALE = 0.3  # brings what is seen to about 1; a norm over the mesh would hide how large curvatures are
+_OFFSET_SCALE = 0.1  # offsets are small at first
 _SLOPE = 0.1
+_LINES, _ROUNDS = 4, 2  # lines at a node inside a head, and times that they are mixed with those of neighbours
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -55,23 +58,23 @@ class Norm(nn.Module):
 
 
 class Convolution(nn.Module):
-    """f_i' = W0 (f_i, max over neighbours j of W1 (f_j - f_i, values of the edge)).
+    """f_i' = W0 (f_i, mean over neighbours j of leaky(A f_i + B f_j + C values of the edge)).
 
-    W1 f_i does not depend on j, so it is taken out of the maximum: every node sends W1 f_j once, and what it gets is
-    the largest message less its own. The paper's layer (section 3.2) has f_j besides, which adds to what is sent.
+    A mean where the paper's layer (section 3.2) has the maximum: it averages over noise, and fits curvature as least
+    squares do. Every node sends B f_j once.
     """
 
     def __init__(self, inputs: int, channels: int) -> None:
         super().__init__()
         self.sent = nn.Linear(inputs, channels, bias=False)
-        self.own = nn.Linear(inputs, channels, bias=False)
+        self.own = nn.Linear(inputs, channels)
         self.along = nn.Parameter(torch.randn(N_EDGE, channels) / N_EDGE**0.5)
         self.out = nn.Linear(inputs + channels, channels)
 
     def forward(self, x: Tensor, graph: Graph) -> Tensor:
         """Return (V, C) from (V, inputs)."""
-        largest = largest_of_neighbours(self.sent(x), self.along, graph) - self.own(x)
-        mixed: Tensor = self.out(torch.cat([x, largest], dim=1))
+        mean = mean_of_neighbours(self.own(x), self.sent(x), self.along, graph, _SLOPE)
+        mixed: Tensor = self.out(torch.cat([x, mean], dim=1))
         return mixed
 
 
@@ -106,9 +109,11 @@ class Blocks(nn.ModuleList):
 
 
 class Head(nn.Module):
-    """Lines at the nodes of a graph: sums of the directions of edges, at twice their angles, with learnt factors.
+    """Lines and vectors at the nodes, as sums with learnt factors of what turns with the mesh.
 
-    The directions turn with the mesh and the factors do not change, so the lines turn with the mesh.
+    A few lines at every node are sums of the directions of its edges, of the duals of these, and of the line of
+    curvature; then they are mixed with those of the neighbours, carried to the tangent frame of the node, twice.
+    Vectors are sums of edges. The factors do not change under motion, so lines and vectors turn with the mesh.
     """
 
     def __init__(self, channels: int, hidden: int = 32) -> None:
@@ -116,23 +121,50 @@ class Head(nn.Module):
         self.start = nn.Linear(channels, hidden)
         self.end = nn.Linear(channels, hidden, bias=False)
         self.along = nn.Linear(N_EDGE, hidden, bias=False)
-        self.out = nn.Linear(hidden, 1)
+        self.of_edges = nn.Linear(hidden, (2 + _ROUNDS) * _LINES + 1)
+        self.of_nodes = nn.Linear(channels, (2 + _ROUNDS) * _LINES)
 
-    def forward(self, x: Tensor, scale: Scale) -> Tensor:
-        """Return lines (V, 2) from (V, C)."""
-        edges = scale.graph.edges_on(x.device)
+    def forward(self, x: Tensor, scale: Scale) -> tuple[Tensor, Tensor]:
+        """Return lines (V, 2) and vectors (V, 3) from (V, C)."""
+        edges, device = scale.graph.edges_on(x.device), x.device
+        share = 1.0 / torch.bincount(edges.node, minlength=len(x)).clamp(min=1)
         inner = self.start(x)[edges.node] + self.end(x)[edges.neighbour] + self.along(edges.along)
-        factor = self.out(nn.functional.leaky_relu(inner, _SLOPE))
-        turns = torch.from_numpy(scale.turns).to(x.device)
-        lines = torch.zeros((len(x), 2), dtype=x.dtype, device=x.device)
-        return lines.index_add(0, edges.node, factor * turns)
+        of_edges = self.of_edges(nn.functional.leaky_relu(inner, _SLOPE)) * share[edges.node, None]
+        direct, dual, *mixing, vector = of_edges.split([_LINES] * (2 + _ROUNDS) + [1], dim=1)
+        fitted, last, *keeping = self.of_nodes(x).split(_LINES, dim=1)
+        turns, duals, ties, ways, fit = (
+            torch.from_numpy(values).to(device)
+            for values in (scale.turns, scale.duals, scale.ties, scale.ways, scale.fit)
+        )
+        along = direct[:, :, None] * turns[:, None] + dual[:, :, None] * duals[:, None]
+        lines = _at_nodes(along, edges.node, len(x)) + fitted[:, :, None] * fit[:, None]
+        for mix, keep in zip(mixing, keeping, strict=True):
+            carried = turned(lines[edges.neighbour], ties[:, None])
+            lines = (1.0 + keep[:, :, None]) * lines + _at_nodes(mix[:, :, None] * carried, edges.node, len(x))
+        vectors = _at_nodes(vector * ways, edges.node, len(x))
+        return (last[:, :, None] * lines).sum(dim=1), vectors
+
+
+class Prediction(NamedTuple):
+    """What the network finds at N points.
+
+    Attributes
+    ----------
+    lines
+        The logarithm of the squared stretch at twice the angle of its direction in the tangent frame (N, 2).
+    offsets
+        From the points to where they are without noise, but for motions along the surface (N, 3).
+    """
+
+    lines: Tensor
+    offsets: Tensor
 
 
 class StretchNetwork(nn.Module):
-    """A U-Net over the graphs of a pyramid that predicts lines of stretch.
+    """A U-Net over the graphs of a pyramid that predicts lines of stretch, and offsets that take noise away.
 
-    Shapes: a pyramid of N points -> lines (N, 2), the logarithm of the squared stretch at twice the angle of its
-    direction in the tangent frame of the point (as in :mod:`anisomesh.metric.tangent`).
+    Shapes: a pyramid of N points -> :class:`Prediction`. Lines are in the tangent frames of the pyramid (see
+    :mod:`anisomesh.metric.tangent`); offsets are sums of edges, and of normals of the first graphs.
     """
 
     def __init__(self, options: NetworkOptions) -> None:
@@ -144,10 +176,25 @@ class StretchNetwork(nn.Module):
         self.up = nn.ModuleList(Blocks(channels, options.blocks) for _ in range(scales - 1))
         self.join = nn.ModuleList(nn.Linear(2 * channels, channels) for _ in range(scales - 1))
         self.heads = nn.ModuleList(Head(channels) for _ in range(options.heads))
+        self.rise = nn.Linear(channels, N_NORMALS)
 
-    def forward(self, pyramid: Pyramid) -> Tensor:
-        """Return lines (N, 2)."""
-        device = next(self.parameters()).device
+    def forward(self, pyramid: Pyramid) -> Prediction:
+        """Return the prediction at the points of a pyramid."""
+        device = self.rise.weight.device
+        features = self._features(pyramid)
+        normals = torch.from_numpy(pyramid.normals).to(device)
+        lines = torch.zeros((len(normals), 2), device=device)
+        offsets = _OFFSET_SCALE * (self.rise(features[0])[:, :, None] * normals).sum(dim=1)
+        for head, scale, x in zip(self.heads, pyramid.scales, features, strict=False):
+            ancestor = torch.from_numpy(scale.ancestor).to(device)
+            coarse, vectors = head(x, scale)
+            lines = lines + turned(coarse[ancestor], torch.from_numpy(scale.carry).to(device))
+            offsets = offsets + vectors[ancestor]
+        return Prediction(lines, offsets)
+
+    def _features(self, pyramid: Pyramid) -> list[Tensor]:
+        """Return the features (V, C) of the nodes of all graphs."""
+        device = self.rise.weight.device
         kept: list[Tensor] = []
         x: Tensor | None = None
         for k, scale in enumerate(pyramid.scales):
@@ -160,13 +207,8 @@ class StretchNetwork(nn.Module):
             scale = pyramid.scales[k]
             cluster = torch.from_numpy(scale.cluster).to(device)
             x = self.join[k](torch.cat([kept[k], features[k + 1][cluster]], dim=1))
-            x = self.up[k](x, scale.graph)
-            features[k] = x
-        lines = torch.zeros((len(pyramid.frames), 2), device=device)
-        for head, scale, x in zip(self.heads, pyramid.scales, features, strict=False):
-            coarse = head(x, scale)[torch.from_numpy(scale.ancestor).to(device)]
-            lines = lines + _turned(coarse, torch.from_numpy(scale.carry).to(device))
-        return lines
+            features[k] = self.up[k](x, scale.graph)
+        return features
 
 
 def _pooled(x: Tensor, scale: Scale) -> Tensor:
@@ -177,8 +219,13 @@ def _pooled(x: Tensor, scale: Scale) -> Tensor:
     return start.scatter_reduce(0, cluster[:, None].expand_as(x), x, "amax", include_self=True)
 
 
-def _turned(lines: Tensor, by: Tensor) -> Tensor:
-    """Return lines (N, 2) turned by rotations (N, 2), as products of complex numbers."""
-    real = lines[:, 0] * by[:, 0] - lines[:, 1] * by[:, 1]
-    imaginary = lines[:, 0] * by[:, 1] + lines[:, 1] * by[:, 0]
-    return torch.stack([real, imaginary], dim=1)
+def _at_nodes(values: Tensor, node: Tensor, n: int) -> Tensor:
+    """Return the sums of values (E, ...) at n nodes (V, ...)."""
+    return values.new_zeros((n, *values.shape[1:])).index_add(0, node, values)
+
+
+def turned(lines: Tensor, by: Tensor) -> Tensor:
+    """Return lines (..., 2) turned by rotations (..., 2), as products of complex numbers."""
+    real = lines[..., 0] * by[..., 0] - lines[..., 1] * by[..., 1]
+    imaginary = lines[..., 0] * by[..., 1] + lines[..., 1] * by[..., 0]
+    return torch.stack([real, imaginary], dim=-1)

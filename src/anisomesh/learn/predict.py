@@ -1,47 +1,135 @@
-"""The metric that a trained network predicts."""
+"""What a trained network makes of a surface: its metric or embedding, and the surface beneath the noise."""
 
 from __future__ import annotations
 
 import os
+from collections.abc import Iterator
+from contextlib import contextmanager
+from dataclasses import dataclass
 from functools import lru_cache
 from pathlib import Path
 
+import numpy as np
 import torch
 
-from anisomesh._arrays import PointTensors
-from anisomesh.learn.checkpoint import WeightsError, load_weights
+from anisomesh._arrays import EmbeddedPoints, Points, PointTensors
+from anisomesh.embedding.given import pulled_back_metric
+from anisomesh.learn.checkpoint import Network, load_weights
+from anisomesh.learn.device import device_of
 from anisomesh.learn.lines import tensors_of
 from anisomesh.learn.network import StretchNetwork
+from anisomesh.learn.paper import PaperNetwork, seen_of
 from anisomesh.learn.pyramid import pyramid
+from anisomesh.learn.shipped import weights_path
 from anisomesh.surface.mesh import Surface
 
+NOISE_FLOOR = 0.05
+"""Mean edge lengths; less noise than that is left."""
 
-def predict_metric(surface: Surface, weights: str | os.PathLike[str]) -> PointTensors:
-    """Return the metric (V, 3, 3) that a network predicts for a surface at bounding-box diagonal 1.
+MAX_STEPS = 3
+"""The most times that noise is taken away."""
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Predicted:
+    """What a network predicts for a surface.
+
+    Attributes
+    ----------
+    tensors
+        The metric (V, 3, 3).
+    points
+        The points without noise (V, 3); those of the surface itself where none is taken away.
+    noise
+        What is taken away: root mean square height over the surface without noise, in mean edge lengths.
+    extra
+        Extra coordinates of the embedding (V, 5), by the paper's network; None by the default one.
+    """
+
+    tensors: PointTensors
+    points: Points
+    noise: float = 0.0
+    extra: EmbeddedPoints | None = None
+
+
+def predict(
+    surface: Surface, weights: str | os.PathLike[str] | None = None, *, device: str = "cpu", denoise: bool = True
+) -> Predicted:
+    """Return what a network predicts for a surface at bounding-box diagonal 1.
 
     Parameters
     ----------
     surface
         The surface; of points without an edge the metric is the identity.
     weights
-        File that training has written.
+        A file that training has written, or the name of a shipped network; None for the default one.
+    device
+        Where the network runs, as torch names it.
+    denoise
+        Whether noise that the network finds is taken away before its metric is asked for.
 
     Raises
     ------
     WeightsError
-        If the file cannot be read, or is of the paper's network.
+        If the file cannot be read.
+    OptionError
+        If there is no such device.
+
+    Notes
+    -----
+    A surface on which the network finds less noise than ``NOISE_FLOOR`` stays as it is. Otherwise the network is asked
+    again on the surface without it, which it sees better, until it finds no more, three times at most.
     """
-    path = Path(weights).resolve()
-    network = _loaded(path, path.stat().st_mtime_ns if path.exists() else 0)
-    seen = pyramid(surface, network.options.scales)
-    with torch.inference_mode():
-        return tensors_of(network(seen).numpy(), seen.frames)
+    path = weights_path(weights).resolve()
+    network = _loaded(path, path.stat().st_mtime_ns if path.exists() else 0, device_of(device))
+    with torch.inference_mode(), _one_thread():
+        if isinstance(network, StretchNetwork):
+            return _stretch(network, surface, denoise=denoise)
+        return _extra(network, surface)
+
+
+def _stretch(network: StretchNetwork, surface: Surface, *, denoise: bool) -> Predicted:
+    """Return the metric where no noise is found, and else that of the surface without it, after up to three steps."""
+    current = surface
+    for step in range(1 + MAX_STEPS):
+        seen = pyramid(current, network.options.scales)
+        found = network(seen)
+        offsets = found.offsets.cpu().numpy().astype(np.float64)
+        if not denoise or step == MAX_STEPS or _height(current, offsets) < NOISE_FLOOR:
+            break
+        current = current.with_points(current.points + offsets)
+    return Predicted(
+        tensors=tensors_of(found.lines.cpu().numpy(), seen.frames),
+        points=current.points,
+        noise=_height(surface, current.points - surface.points),
+    )
+
+
+def _extra(network: PaperNetwork, surface: Surface) -> Predicted:
+    extra = network(seen_of(surface)).cpu().numpy().astype(np.float64)
+    return Predicted(tensors=pulled_back_metric(surface, extra), points=surface.points, extra=extra)
+
+
+def _height(surface: Surface, offsets: Points) -> float:
+    """Return the root mean square of the offsets (V, 3) along the normals, in mean edge lengths."""
+    if surface.n_faces == 0:
+        return 0.0
+    heights = np.einsum("nx,nx->n", surface.point_normals, offsets)
+    return float(np.sqrt((heights**2).mean()) / surface.edge_lengths.mean())
+
+
+@contextmanager
+def _one_thread() -> Iterator[None]:
+    """Have torch take sums in the same order on every machine until the end of the block."""
+    before = torch.get_num_threads()
+    torch.set_num_threads(1)
+    try:
+        yield
+    finally:
+        torch.set_num_threads(before)
 
 
 @lru_cache(maxsize=4)
-def _loaded(path: Path, changed: int) -> StretchNetwork:
+def _loaded(path: Path, changed: int, device: torch.device) -> Network:
     """Return the network in a file, read again when the file has changed."""
-    network = load_weights(path)[0]
-    if not isinstance(network, StretchNetwork):
-        raise WeightsError(f"{path} has weights of the paper's network, which gives no metric; train the default one")
-    return network.eval()
+    return load_weights(path)[0].to(device).eval()

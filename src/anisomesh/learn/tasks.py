@@ -1,4 +1,4 @@
-"""What networks are trained for: lines of stretch (the default), or the paper's embedding; examples and losses."""
+"""What networks are trained for: stretch and offsets (the default), or the paper's embedding; examples and losses."""
 
 from __future__ import annotations
 
@@ -10,15 +10,19 @@ import torch
 from torch import Tensor, nn
 
 from anisomesh.learn.config import TrainingOptions
-from anisomesh.learn.examples import Example, example_of, with_noise
+from anisomesh.learn.examples import Example, example_of
 from anisomesh.learn.items import Item
-from anisomesh.learn.lines import line_loss
-from anisomesh.learn.losses import cosine_loss, dot_loss, l2_loss, laplacian_loss
-from anisomesh.learn.network import NetworkOptions, StretchNetwork
+from anisomesh.learn.losses import cosine_loss, dot_loss, l2_loss, laplacian_loss, line_loss, offset_loss
+from anisomesh.learn.network import NetworkOptions, Prediction, StretchNetwork
 from anisomesh.learn.paper import PaperNetwork, PaperOptions, Seen, seen_of
 from anisomesh.surface.mesh import Surface
+from anisomesh.surface.noise import NOISES, with_noise
 
+_OFFSETS = 2.0  # weight of the loss of offsets, beside that of lines
 _QUARTER = np.array([[0.0, -1.0, 0.0], [1.0, 0.0, 0.0], [0.0, 0.0, 1.0]])
+
+
+Losses = dict[str, Tensor]
 
 
 class Task(Protocol):
@@ -32,22 +36,22 @@ class Task(Protocol):
         """Return what the network sees of an item with noise, in mean edge lengths, and what is wanted of it."""
         ...
 
-    def loss(self, network: nn.Module, example: Any) -> Tensor:
-        """Return the loss of a network on an example."""
+    def losses(self, network: nn.Module, example: Any) -> Losses:
+        """Return the losses of a network on an example, of which training lowers the sum."""
         ...
 
-    def loss_of_nothing(self, example: Any) -> float:
-        """Return the loss of predicting no stretch at all."""
+    def losses_of_nothing(self, example: Any) -> Losses:
+        """Return those of predicting no stretch, and no noise."""
         ...
 
 
 def task_of(options: TrainingOptions) -> Task:
     """Return the task of a training run."""
-    return LinesTask(options) if isinstance(options.network, NetworkOptions) else EmbeddingTask(options)
+    return StretchTask(options) if isinstance(options.network, NetworkOptions) else EmbeddingTask(options)
 
 
-class LinesTask:
-    """Lines of stretch by the default network; turns with the mesh, so it needs no turned copies."""
+class StretchTask:
+    """Lines of stretch and offsets by the default network; it turns with the mesh, so it needs no turned copies."""
 
     def __init__(self, options: TrainingOptions) -> None:
         assert isinstance(options.network, NetworkOptions)
@@ -58,16 +62,27 @@ class LinesTask:
         return StretchNetwork(self._network)
 
     def example(self, item: Item, noise: float, rng: np.random.Generator, *, training: bool) -> Example:
-        """See :class:`Task`."""
-        return example_of(item, self._network.scales, noise, rng)
+        """See :class:`Task`. In training the noise is of any kind."""
+        kind = NOISES[int(rng.integers(len(NOISES)))] if training else NOISES[0]
+        return example_of(item, self._network.scales, noise, rng, kind)
 
-    def loss(self, network: nn.Module, example: Example) -> Tensor:
+    def losses(self, network: nn.Module, example: Example) -> Losses:
         """See :class:`Task`."""
-        return line_loss(network(example.pyramid), example.lines, example.weight)
+        return self._losses(Prediction(*(values.cpu() for values in network(example.pyramid))), example)
 
-    def loss_of_nothing(self, example: Example) -> float:
+    def losses_of_nothing(self, example: Example) -> Losses:
         """See :class:`Task`."""
-        return float(line_loss(torch.zeros_like(example.lines), example.lines, example.weight))
+        nothing = Prediction(torch.zeros_like(example.lines), torch.zeros_like(example.offsets))
+        return self._losses(nothing, example)
+
+    def _losses(self, found: Prediction, example: Example) -> Losses:
+        offset = offset_loss(
+            found.offsets / example.unit, example.offsets, example.quadrics, example.edges, example.weight
+        )
+        return {
+            "lines": line_loss(found.lines, example.lines, example.weight),
+            "offsets": _OFFSETS * offset,
+        }
 
 
 @dataclass(frozen=True, eq=False)
@@ -110,13 +125,13 @@ class EmbeddingTask:
             edges=torch.from_numpy(clean.edges.astype(np.int64)),
         )
 
-    def loss(self, network: nn.Module, example: EmbeddingExample) -> Tensor:
+    def losses(self, network: nn.Module, example: EmbeddingExample) -> Losses:
         """See :class:`Task`."""
-        return self._loss(network(example.seen), example)
+        return {"embedding": self._loss(network(example.seen).cpu(), example)}
 
-    def loss_of_nothing(self, example: EmbeddingExample) -> float:
+    def losses_of_nothing(self, example: EmbeddingExample) -> Losses:
         """See :class:`Task`."""
-        return float(self._loss(torch.zeros_like(example.extra), example))
+        return {"embedding": self._loss(torch.zeros_like(example.extra), example)}
 
     def _loss(self, extra: Tensor, example: EmbeddingExample) -> Tensor:
         options = self._options

@@ -17,25 +17,22 @@ import numpy as np
 import torch
 
 from anisomesh.errors import OptionError
-from anisomesh.learn.checkpoint import WeightsError, load_state, save_state, save_weights
+from anisomesh.learn.checkpoint import WeightsError, load_state, load_weights, save_state, save_weights
 from anisomesh.learn.config import TrainingOptions
+from anisomesh.learn.device import device_of
+from anisomesh.learn.events import Events
 from anisomesh.learn.items import load_item
+from anisomesh.learn.manifest import Files
+from anisomesh.learn.shipped import weights_path
 from anisomesh.learn.tasks import Task, task_of
 from anisomesh.learn.workers import Workers, workers
 from anisomesh.surface.files import atomic_path
 
-CHECKPOINT, WEIGHTS, METRICS = "checkpoint.safetensors", "weights.safetensors", "metrics.jsonl"
+CHECKPOINT, WEIGHTS = "checkpoint.safetensors", "weights.safetensors"
+METRICS, EVENTS = "metrics.jsonl", "events"
 VALIDATION_NOISE = (0.0, 0.3)  # mean edge lengths
 
 Row = dict[str, Any]
-
-
-@dataclass(frozen=True)
-class Files:
-    """Items of a data set for training and for validation."""
-
-    training: list[Path]
-    validation: list[Path]
 
 
 @dataclass
@@ -67,8 +64,9 @@ def train(
     Returns
     -------
     rows
-        One an epoch, also in ``metrics.jsonl``: ``epoch``, mean training ``loss``, learning ``rate``, ``seconds``, and
-        the losses on validation items at each noise, as a share of those of predicting nothing.
+        One an epoch, also in ``metrics.jsonl``, and for TensorBoard in ``events``: ``epoch``, mean training ``loss``,
+        learning ``rate``, ``seconds``, and of each noise the ``validation`` loss, as a share of that of predicting
+        nothing, and its parts.
 
     Raises
     ------
@@ -90,9 +88,9 @@ def train(
     out.mkdir(parents=True, exist_ok=True)
     torch.manual_seed(options.seed)
     task = task_of(options)
-    network = task.network()
-    optimiser = torch.optim.AdamW(network.parameters(), lr=options.rate, weight_decay=options.weight_decay)
     with _Interruption() as interrupted, _deterministic(), workers() as group:
+        network = _network(task, options.start).to(device_of(options.device, group.local_rank))
+        optimiser = torch.optim.AdamW(network.parameters(), lr=options.rate, weight_decay=options.weight_decay)
         run = _Run(options, task, files, network, optimiser, out, group)
         if resume:
             run.load()
@@ -104,11 +102,31 @@ def train(
         return run.rows()
 
 
+def _network(task: Task, start: str) -> Any:
+    """Return a network with random weights, or with those that it is to start from.
+
+    Raises
+    ------
+    WeightsError
+        If these are of another kind or size.
+    """
+    network = task.network()
+    if start:
+        other = load_weights(weights_path(start))[0]
+        if other.options != network.options:
+            raise WeightsError(f"{start} has weights of a network of another kind or size: {other.options}")
+        network.load_state_dict(other.state_dict())
+    return network
+
+
 @contextmanager
 def _deterministic() -> Iterator[None]:
-    """Have torch take sums in the same order every time, for any number of threads, until the end of the block."""
+    """Have torch take sums in the same order every time, for any number of threads, until the end of the block.
+
+    On a GPU it warns where it cannot.
+    """
     before = torch.are_deterministic_algorithms_enabled()
-    torch.use_deterministic_algorithms(True)
+    torch.use_deterministic_algorithms(True, warn_only=torch.cuda.is_available())
     try:
         yield
     finally:
@@ -151,6 +169,7 @@ class _Run:
         self.options, self.task, self.files, self.out = options, task, files, out
         self.network, self.optimiser, self.group = network, optimiser, group
         self.at = _Position()
+        self._events = Events(out / EVENTS)
         self._steps = max(1, math.ceil(len(files.training) / options.batch))
 
     def epoch(self, interrupted: _Interruption) -> Row:
@@ -190,21 +209,28 @@ class _Run:
         rows = [*(known for known in self.rows() if known["epoch"] < row["epoch"]), row]
         with atomic_path(self.out / METRICS) as temporary:
             Path(temporary).write_text("".join(json.dumps(entry) + "\n" for entry in rows), encoding="utf-8")
+        self._events.add(row)
         self.save()
 
     def validate(self) -> Row:
-        """Return the mean loss on the validation items at each noise, over that of predicting nothing."""
+        """Return the mean losses on the validation items at each noise.
+
+        Of each noise the sum, over that of predicting nothing, and then every loss as it is.
+        """
         self.network.eval()
         found = {}
         with torch.no_grad():
             for noise in VALIDATION_NOISE:
-                losses, nothing = [], []
+                sums: dict[str, float] = {}
+                nothing = 0.0
                 for number, path in enumerate(self.files.validation):
                     rng = np.random.default_rng([self.options.seed, number])
                     example = self.task.example(load_item(path), noise, rng, training=False)
-                    losses.append(float(self.task.loss(self.network, example)))
-                    nothing.append(self.task.loss_of_nothing(example))
-                found[f"validation {noise:g}"] = float(np.mean(losses) / max(float(np.mean(nothing)), 1e-30))
+                    for name, value in self.task.losses(self.network, example).items():
+                        sums[name] = sums.get(name, 0.0) + float(value)
+                    nothing += sum(map(float, self.task.losses_of_nothing(example).values()))
+                found[f"validation {noise:g}"] = sum(sums.values()) / max(nothing, 1e-30)
+                found |= {f"{name} {noise:g}": value / len(self.files.validation) for name, value in sums.items()}
         self.network.train()
         return found
 
@@ -232,7 +258,9 @@ class _Run:
         state = load_state(self.out / CHECKPOINT, self.network, self.optimiser)
         mine = asdict(self.options)
         other = [
-            name for name, value in state["training"].items() if name not in ("out", "data") and mine.get(name) != value
+            name
+            for name, value in state["training"].items()
+            if name not in ("out", "data", "device") and mine.get(name) != value
         ]
         if other or state["items"] != self._items():
             what = f"another {', '.join(other)}" if other else "other items"
@@ -248,7 +276,8 @@ class _Run:
             rng = np.random.default_rng([options.seed, self.at.epoch, number])
             noise = options.noise * rng.random() if rng.random() < options.noise_share else 0.0
             example = self.task.example(load_item(self.files.training[number]), noise, rng, training=True)
-            loss = self.task.loss(self.network, example) / len(chosen)
+            losses = self.task.losses(self.network, example)
+            loss = torch.stack(list(losses.values())).sum() / len(chosen)
             loss.backward()  # type: ignore[no-untyped-call]
             total += float(loss.detach())
         self.group.sum_gradients(self.network.parameters())

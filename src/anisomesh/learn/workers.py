@@ -14,10 +14,11 @@ from torch import nn
 
 @dataclass(frozen=True)
 class Workers:
-    """One process among those that train together: its rank, and how many there are."""
+    """One process among those that train together: its rank, how many there are, and its rank on this machine."""
 
     rank: int = 0
     size: int = 1
+    local_rank: int = 0
 
     @property
     def is_first(self) -> bool:
@@ -33,7 +34,7 @@ class Workers:
             if parameter.grad is None:
                 parameter.grad = torch.zeros_like(parameter)
             gradients.append(parameter.grad)
-        flat = torch.cat([gradient.ravel() for gradient in gradients])
+        flat = torch.cat([gradient.ravel() for gradient in gradients]).cpu()
         distributed.all_reduce(flat)
         place = 0
         for gradient in gradients:
@@ -63,6 +64,7 @@ def workers() -> Iterator[Workers]:
         return
     distributed.init_process_group("gloo")
     try:
-        yield Workers(rank=distributed.get_rank(), size=size)
+        local_rank = int(os.environ.get("LOCAL_RANK", "0"))
+        yield Workers(rank=distributed.get_rank(), size=size, local_rank=local_rank)
     finally:
         distributed.destroy_process_group()
