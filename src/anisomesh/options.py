@@ -13,7 +13,8 @@ import numpy.typing as npt
 from anisomesh.errors import OptionError
 from anisomesh.metric.tensor import METRIC_NAMES, MetricName
 
-EMBEDDINGS = ("direct", "neural")
+EMBEDDINGS = ("auto", "direct", "neural", "hybrid")
+DEVICES = ("cpu", "cuda")
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -31,10 +32,17 @@ class RemeshOptions:
         ``"curvature"``, ``"approximation"``, ``"uniform"``, or tensors (V, 3, 3) at the points of the input, in
         model units.
     embedding
-        ``"direct"``: the metric comes from principal curvatures; ``"neural"``: a trained network predicts it (only for
-        ``metric`` ``"curvature"``).
+        Where the metric comes from. ``"direct"``: measured principal curvatures; ``"neural"``: a trained network, which
+        takes noise away first; ``"hybrid"``: a mean of both, on the surface without noise; ``"auto"``: hybrid where
+        torch is installed and the metric is ``"curvature"``, the only one that networks know, else direct.
     weights
-        File of the trained network, for ``"neural"``.
+        For ``"neural"`` and ``"hybrid"``: a file that training has written, or the name of a network that comes with
+        the package; by default the one called ``default``.
+    device
+        Where the network runs, ``"cpu"`` or ``"cuda"``.
+    denoise
+        Whether the result follows the surface that the network sees beneath the noise, where it finds any, and not
+        the noise.
     seed
         Of the start positions; the same seed and input give the same result.
     threads
@@ -58,8 +66,10 @@ class RemeshOptions:
     sharpness: float = 7.0
     final_sharpness: float | None = None
     metric: MetricName | npt.NDArray[Any] = "curvature"
-    embedding: str = "direct"
+    embedding: str = "auto"
     weights: str | os.PathLike[str] | None = None
+    device: str = "cpu"
+    denoise: bool = True
     seed: int = 0
     threads: int = 2
     lloyd_iterations: int = 9
@@ -77,12 +87,13 @@ class RemeshOptions:
                 raise OptionError(f"{name} = {value}; expected a finite number of at least 1 (1 is the plain CVT)")
         if isinstance(self.metric, str) and self.metric not in METRIC_NAMES:
             raise OptionError(f"metric = {self.metric!r}; expected one of {', '.join(METRIC_NAMES)}, or tensors")
-        if self.embedding not in EMBEDDINGS:
-            raise OptionError(f"embedding = {self.embedding!r}; expected one of {', '.join(EMBEDDINGS)}")
-        if (self.embedding == "neural") != (self.weights is not None):
-            raise OptionError("embedding 'neural' and the weights of a trained network have to be given together")
-        if self.embedding == "neural" and not (isinstance(self.metric, str) and self.metric == "curvature"):
-            raise OptionError("embedding 'neural' predicts the curvature metric and takes no other")
+        for name, known in (("embedding", EMBEDDINGS), ("device", DEVICES)):
+            if getattr(self, name) not in known:
+                raise OptionError(f"{name} = {getattr(self, name)!r}; expected one of {', '.join(known)}")
+        if self.embedding == "direct" and self.weights is not None:
+            raise OptionError("weights are of a network, and embedding 'direct' has none; ask for 'neural' or 'hybrid'")
+        if self.embedding in ("neural", "hybrid") and not (isinstance(self.metric, str) and self.metric == "curvature"):
+            raise OptionError(f"embedding {self.embedding!r} predicts the curvature metric and takes no other")
         if not 0.0 <= self.feature_angle <= 180.0:
             raise OptionError(f"feature_angle = {self.feature_angle}; expected 0 to 180 degrees")
         if self.time_limit is not None and not self.time_limit > 0.0:

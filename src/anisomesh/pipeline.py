@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import os
 import time
 from collections.abc import Iterator
 from contextlib import contextmanager
@@ -20,11 +19,12 @@ from anisomesh.cvt.optimise import Optimised, Status
 from anisomesh.cvt.voronoi import RestrictedVoronoi
 from anisomesh.dual.refine import Refined, refine
 from anisomesh.embedding.direct import embed
+from anisomesh.embedding.given import given_embedding
 from anisomesh.errors import MetricError, OptionError, TimeLimitError
+from anisomesh.estimate import estimated
 from anisomesh.evaluation.validity import Validity, check_validity
-from anisomesh.learn import require_torch
 from anisomesh.memory import check_memory
-from anisomesh.metric.tensor import MetricName, compute_metric
+from anisomesh.metric.tensor import MetricName
 from anisomesh.options import OnStep, RemeshOptions, StepInfo
 from anisomesh.result import RemeshResult
 from anisomesh.schedule import optimise
@@ -134,23 +134,25 @@ def _remesh(
     """Remesh a prepared surface with n vertices, given the metric's name or tensors at its points, and tagged edges."""
     with run.stage("prepare"):
         frame = unit_frame(prepared.surface.points)
-        unit = prepared.surface.with_points(frame.to_unit(prepared.surface.points))
-        split = _split(unit, n)
-        working = split.surface
-        check_memory(n, working.n_faces)
-    with run.stage("metric"):
+        given = prepared.surface.with_points(frame.to_unit(prepared.surface.points))
+        split = _split(given, n)
+        check_memory(n, split.surface.n_faces)
         if not isinstance(wanted, str):
-            wanted = split.interpolate(wanted) * frame.scale**2
-        elif options.weights is not None:
-            wanted = _predicted(working, options.weights)
-        metric = compute_metric(working, wanted)
+            wanted = wanted * frame.scale**2
+    with run.stage("metric"):
+        estimate = estimated(given, split, wanted, options)
+        working = estimate.working
     with run.stage("embed"):
-        embedding = embed(working, metric.tensors, max_iterations=options.embedding_iterations)
+        embedding = (
+            embed(working, estimate.tensors, max_iterations=options.embedding_iterations)
+            if estimate.extra is None
+            else given_embedding(working, estimate.extra)
+        )
     run.check_time()
     with run.stage("cvt"):
         voronoi = RestrictedVoronoi(embedding.points, working.faces, threads=options.threads)
         ordered = Surface(working.points, voronoi.faces)
-        features = _features(voronoi, ordered, n, edges_within(split, unit, tagged), options)
+        features = _features(voronoi, ordered, n, edges_within(split, given, tagged), options)
         stop = partial(run.clock.over, OPTIMISATION_SHARE)
         optimised = optimise(voronoi, n, ordered, features, embedding.scale, options, run.on_step, stop)
     with run.stage("dual"):
@@ -158,20 +160,22 @@ def _remesh(
             voronoi,
             optimised.sites,
             ordered,
-            unit,
+            estimate.plain,
             features,
             embedding.scale,
             n_vertices=n,
-            tensors=metric.tensors,
+            tensors=estimate.tensors,
             stop=run.clock.over,
         )
         surface = Surface(frame.to_model(refined.points), refined.faces)
-        validity = check_validity(Surface(refined.points, refined.faces), unit)
+        validity = check_validity(Surface(refined.points, refined.faces), estimate.plain)
     return RemeshResult(
         surface=surface,
         prepared=prepared.surface,
         prepare_report=prepared.report,
         working=working,
+        embedded=estimate.kind,
+        noise=estimate.noise,
         frame=frame,
         embedding=embedding,
         diagram=refined.diagram,
@@ -184,21 +188,13 @@ def _remesh(
         removed=refined.removed,
         validity=validity,
         seconds=run.total_seconds(),
-        warnings=tuple(_warnings(n, surface, refined, validity, optimised, options)),
+        warnings=tuple(_warnings(n, surface, estimate.noise, refined, validity, optimised, options)),
     )
 
 
 def _split(surface: Surface, n: int) -> Subdivided:
     """Return a surface with edges fine enough for n sites, or as fine as the bound on its faces allows."""
     return split_long_edges(surface, max_edge(surface, n), max_faces=max(MAX_GROWTH * surface.n_faces, MAX_SPLIT_FACES))
-
-
-def _predicted(surface: Surface, weights: str | os.PathLike[str]) -> npt.NDArray[np.float64]:
-    """Return the metric (V, 3, 3) that the network with these weights predicts."""
-    require_torch()
-    from anisomesh.learn.predict import predict_metric
-
-    return predict_metric(surface, weights)
 
 
 def _features(
@@ -275,8 +271,16 @@ def _at_prepared(tensors: npt.NDArray[Any], given: Surface, prepared: Prepared) 
 
 
 def _warnings(
-    n: int, surface: Surface, refined: Refined, validity: Validity, optimised: Optimised, options: RemeshOptions
+    n: int,
+    surface: Surface,
+    noise: float,
+    refined: Refined,
+    validity: Validity,
+    optimised: Optimised,
+    options: RemeshOptions,
 ) -> Iterator[str]:
+    if noise > 0.0:
+        yield f"noise of {noise:.2f} mean edge lengths was taken away first; the result follows the surface beneath it"
     if optimised.status is Status.TIME_LIMIT:
         count = optimised.iterations
         yield f"the time limit of {options.time_limit:g} s ended the optimisation after {count} iterations"

@@ -31,6 +31,11 @@ class RemeshResult:
         What the repair did, as counts.
     working
         The prepared input with long edges split, at bounding-box diagonal 1: what was embedded.
+    embedded
+        ``"direct"``, ``"neural"`` or ``"hybrid"``: where the metric comes from.
+    noise
+        Noise that a network has found in the input and taken away before anything else: root mean square height over
+        ``working``, in mean edge lengths; 0 where none was taken away.
     frame
         The similarity between model units and ``working``.
     embedding
@@ -59,6 +64,8 @@ class RemeshResult:
     prepared: Surface
     prepare_report: PrepareReport
     working: Surface
+    embedded: str
+    noise: float
     frame: Frame
     embedding: Embedding
     diagram: Diagram
@@ -82,6 +89,8 @@ class RemeshResult:
             "faces": self.surface.n_faces,
             "seconds": dict(self.seconds),
             "distance": self.distance,
+            "embedding": self.embedded,
+            "noise": self.noise,
             "energy": self.energy,
             "iterations": self.iterations,
             "status": self.status.value,

@@ -73,6 +73,7 @@ def test_summary_names_warnings_notes_and_files(tmp_path):
         "faces": 2400,
         "validity": SOUND,
         "stretch": {"mean": 2.0, "max": 9.0},
+        "embedding": "hybrid",
         "status": "converged",
         "iterations": 50,
         "energy": None,

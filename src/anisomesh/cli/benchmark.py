@@ -25,6 +25,9 @@ def command(
         Path | None,
         typer.Option(envvar="ANISOMESH_DATA", help="Folder that the mesh patterns of the suite refer to."),
     ] = None,
+    items: Annotated[
+        Path | None, typer.Option(help="Data set, for suites that train networks: see anisomesh dataset build.")
+    ] = None,
     ratios: Annotated[
         list[float] | None,
         typer.Option("--ratio", help="Only this share of the vertices, not all of the suite; may be given again."),
@@ -53,7 +56,14 @@ def command(
         announce_compilation(display, "evaluate")
     out.mkdir(parents=True, exist_ok=True)
     stem = out / wanted.name
-    rows = run_suite(wanted, stem.with_suffix(".jsonl"), data=data, on_row=lambda step: None if quiet else _print(step))
+    rows = run_suite(
+        wanted,
+        stem.with_suffix(".jsonl"),
+        data=data,
+        items=items,
+        on_row=lambda step: None if quiet else _print(step),
+        on_epoch=lambda text: None if quiet else print(text, file=sys.stderr, flush=True),
+    )
     chart = _chart(wanted, rows)
     texts = {".svg": chart} if chart else {}
     texts[".md"] = markdown(wanted, rows, f"{wanted.name}.svg" if chart else "")
@@ -77,7 +87,7 @@ def _chart(suite: Suite, rows: list[Row]) -> str:
 
 def _print(step: Progress) -> None:
     row = step.row
-    name = f"{Path(row['mesh']).name[:32]:<32} {row['ratio']:>4.0%} {row['method']:<20}"
+    name = f"{Path(row['mesh']).name[:32]:<32} {row['ratio']:>4.0%} {row['input']:<9} {row['method']:<20}"
     if row["status"] == "done":
         found = row["evaluation"]
         said = f"G {found['shape']['g_mean']:.3f} RMS {found['distance']['rms']:.2e} {row['seconds']:.2f} s"

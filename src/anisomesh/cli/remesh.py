@@ -31,8 +31,17 @@ from anisomesh.cli.report import as_json, summary
 class Embedding(StrEnum):
     """How the surface is embedded."""
 
+    auto = "auto"
     direct = "direct"
     neural = "neural"
+    hybrid = "hybrid"
+
+
+class Device(StrEnum):
+    """Where a network runs."""
+
+    cpu = "cpu"
+    cuda = "cuda"
 
 
 def command(
@@ -57,10 +66,15 @@ def command(
         Path | None,
         typer.Option(metavar="FILE", help="Edges to keep: a text file, two vertex numbers a line, the first is 0."),
     ] = None,
-    embedding: Annotated[Embedding, typer.Option(help="How the surface is embedded.")] = Embedding.direct,
+    embedding: Annotated[Embedding, typer.Option(help="How the surface is embedded.")] = Embedding.auto,
     weights: Annotated[
-        Path | None, typer.Option(metavar="FILE", help="Trained network, for --embedding neural.")
+        str | None,
+        typer.Option(metavar="FILE", help="Trained network in place of the one of the package, or its name."),
     ] = None,
+    device: Annotated[Device, typer.Option(help="Where the network runs.")] = Device.cpu,
+    denoise: Annotated[
+        bool, typer.Option("--denoise/--keep-noise", help="Whether the noise that the network finds is taken away.")
+    ] = True,
     seed: Seed = 0,
     threads: Threads = 2,
     time_limit: Annotated[
@@ -84,7 +98,7 @@ def command(
     outputs = Outputs(mesh=out, report=report, rvd=rvd, picture=picture)
     outputs.check()
     options = remesh_options(metric, sharpness, final_sharpness, seed, threads)
-    options |= {"embedding": embedding.value, "weights": None if weights is None else str(weights)}
+    options |= {"embedding": embedding.value, "weights": weights, "device": device.value, "denoise": denoise}
     options |= {"feature_angle": feature_angle, "time_limit": time_limit}
     with progress(quiet) as display:
         surface, seconds = read(source)

@@ -10,6 +10,11 @@ from typing import TYPE_CHECKING, Any
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
+EMBEDDINGS = {
+    "direct": "direct (no network)",
+    "neural": "neural (a network gives the metric)",
+    "hybrid": "hybrid (a mean of the measured metric and that of a network)",
+}
 STAGES = ("load", "prepare", "metric", "embed", "cvt", "dual")
 
 
@@ -68,6 +73,7 @@ def summary(report: dict[str, Any], written: Sequence[Path], notes: Sequence[str
         ("surface", describe_validity(report["validity"])),
         *([("distance", f"{report['distance']:.4g} from the input at most")] if report.get("distance") else []),
         ("stretch", f"mean {stretch['mean']:.2f}, largest {stretch['max']:.2f} (1 = equilateral)"),
+        ("embedding", EMBEDDINGS[report["embedding"]]),
         ("optimiser", f"{counted(report['iterations'], 'iteration')}{energy}: {report['status']}"),
         ("seconds", f"{seconds['total']:.2f} ({stages})"),
         *(("prepared", note) for note in notes),

@@ -18,6 +18,7 @@ class EmbeddingStatus(StrEnum):
     """Why the iteration stopped."""
 
     EXACT = "the metric is a multiple of the identity: no extra coordinates are needed"
+    GIVEN = "the extra coordinates were given"
     CONVERGED = "converged"
     ITERATION_LIMIT = "iteration limit reached; raise max_iterations for a closer match of the metric"
 

@@ -1,0 +1,41 @@
+"""An embedding whose extra coordinates are given, as by a network, and the metric that it has."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from anisomesh._arrays import EmbeddedPoints, PointTensors
+from anisomesh.embedding.base import Embedding, EmbeddingStatus, stretch_statistics
+from anisomesh.embedding.gradient import face_gradient
+from anisomesh.surface.mesh import Surface
+
+
+def given_embedding(surface: Surface, extra: EmbeddedPoints) -> Embedding:
+    """Return the embedding [xyz, extra] of a surface, from extra coordinates (V, k)."""
+    points = np.concatenate([surface.points, extra], axis=1)
+    return Embedding(
+        points=points,
+        scale=1.0,
+        residual=0.0,
+        iterations=0,
+        status=EmbeddingStatus.GIVEN,
+        stretch=stretch_statistics(surface, pulled_back_metric(surface, extra), points),
+    )
+
+
+def pulled_back_metric(surface: Surface, extra: EmbeddedPoints) -> PointTensors:
+    """Return the metric (V, 3, 3) that lengths in the embedding [xyz, extra] are.
+
+    On a face it is the identity and the sum of g g^t over the gradients g of the extra coordinates (V, k), so 1 along
+    the normal; at a point the mean of the faces around it by area, the identity where there are none.
+    """
+    gradient = face_gradient(surface)
+    slopes = (gradient.operator @ extra).reshape(surface.n_faces, 2, -1)
+    in_space = np.einsum("fkx,fkc->fxc", gradient.frames, slopes)
+    weighted = gradient.areas[:, None, None] * (in_space @ in_space.transpose(0, 2, 1))
+    corners = surface.faces.ravel()
+    flat = np.repeat(weighted.reshape(surface.n_faces, 9), 3, axis=0)
+    total = np.stack([np.bincount(corners, column, minlength=surface.n_points) for column in flat.T], axis=1)
+    area = np.bincount(corners, np.repeat(gradient.areas, 3), minlength=surface.n_points)
+    mean = np.divide(total, area[:, None], out=np.zeros_like(total), where=area[:, None] > 0.0)
+    return np.asarray(np.eye(3) + mean.reshape(-1, 3, 3))

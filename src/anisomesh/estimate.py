@@ -1,0 +1,111 @@
+"""What is embedded: a surface and its metric, measured on it or as a trained network sees them."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+
+from anisomesh._arrays import EmbeddedPoints, PointTensors
+from anisomesh.learn import require_torch, torch_is_there
+from anisomesh.learn.lines import directions_of, lines_in, tensors_of
+from anisomesh.metric.curvature import principal_curvatures
+from anisomesh.metric.tangent import tangent_frames, unit_normals
+from anisomesh.metric.tensor import MetricName, compute_metric, curvature_metric
+from anisomesh.options import RemeshOptions
+from anisomesh.surface.mesh import Surface
+from anisomesh.surface.subdivide import Refined
+
+MEASURED_SHARE = 0.7
+"""Of the measured curvature in the hybrid metric; the best of 0.3, 0.5 and 0.7 on validation families."""
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Estimate:
+    """A surface and its metric.
+
+    Attributes
+    ----------
+    plain, working
+        The surface, and with long edges split, whose first points are those of ``plain``; without noise where a network
+        has found some.
+    tensors
+        The metric at the points of ``working`` (V, 3, 3).
+    kind
+        ``"direct"``, ``"neural"`` or ``"hybrid"``.
+    noise
+        What a network has taken away: root mean square height over the surface, in mean edge lengths.
+    extra
+        Extra coordinates of the embedding (V, 5), if a network has found these too.
+    """
+
+    plain: Surface
+    working: Surface
+    tensors: PointTensors
+    kind: str
+    noise: float = 0.0
+    extra: EmbeddedPoints | None = None
+
+
+def chosen_embedding(options: RemeshOptions) -> str:
+    """Return how to embed, ``"direct"``, ``"neural"`` or ``"hybrid"``, for options that may leave it open."""
+    if options.embedding != "auto":
+        return options.embedding
+    asked = options.weights is not None or torch_is_there()
+    return "hybrid" if asked and isinstance(options.metric, str) and options.metric == "curvature" else "direct"
+
+
+def estimated(
+    plain: Surface, split: Refined, wanted: MetricName | npt.NDArray[Any], options: RemeshOptions
+) -> Estimate:
+    """Return the surface and metric to be embedded.
+
+    Parameters
+    ----------
+    plain, split
+        The surface at bounding-box diagonal 1, and with long edges split.
+    wanted
+        Name of the metric, or tensors at the points of ``plain`` (V, 3, 3).
+    options
+        Say whether a network is asked.
+
+    Raises
+    ------
+    MetricError
+        If the tensors are not symmetric positive definite.
+    WeightsError, LearningError
+        If the network cannot be loaded, or torch is not installed.
+    OptionError
+        If the device cannot be used.
+    """
+    working = split.surface
+    if not isinstance(wanted, str):
+        wanted = split.interpolate(wanted)
+    kind = chosen_embedding(options)
+    if kind == "direct":
+        return Estimate(plain=plain, working=working, tensors=compute_metric(working, wanted).tensors, kind=kind)
+    require_torch()
+    from anisomesh.learn.predict import predict
+
+    found = predict(working, options.weights, device=options.device, denoise=options.denoise)
+    if found.noise > 0.0:
+        plain, working = plain.with_points(found.points[: plain.n_points]), working.with_points(found.points)
+    tensors, extra = found.tensors, found.extra
+    if kind == "hybrid":
+        tensors, extra = _blended(working, tensors), None
+    return Estimate(plain=plain, working=working, tensors=tensors, kind=kind, noise=found.noise, extra=extra)
+
+
+def _blended(surface: Surface, predicted: PointTensors) -> PointTensors:
+    """Return a mean of a predicted metric (V, 3, 3) and the measured one; the former where curvature is not known well.
+
+    The weighted mean of the lines: the logarithm of the squared stretch, at twice the angle of its direction.
+    """
+    curvature = principal_curvatures(surface)
+    measured = curvature_metric(surface, curvature)
+    frames = tangent_frames(unit_normals(surface))
+    lines, other = (lines_in(frames, *directions_of(tensors)) for tensors in (predicted, measured))
+    share = np.where(curvature.trusted, MEASURED_SHARE, 0.0)[:, None]
+    return tensors_of((1.0 - share) * lines + share * other, frames)

@@ -1,0 +1,125 @@
+"""Remeshing with the network that comes with the package."""
+
+import numpy as np
+import pytest
+
+torch = pytest.importorskip("torch")
+
+import anisomesh  # noqa: E402
+from anisomesh.errors import OptionError  # noqa: E402
+from anisomesh.evaluation.report import evaluate  # noqa: E402
+from anisomesh.learn.checkpoint import WeightsError, load_weights  # noqa: E402
+from anisomesh.learn.predict import NOISE_FLOOR, predict  # noqa: E402
+from anisomesh.learn.shipped import shipped_weights, weights_path  # noqa: E402
+from anisomesh.surface.noise import with_noise  # noqa: E402
+from anisomesh.surface.shapes import box, ellipsoid, sphere, torus, twisted_ring  # noqa: E402
+
+
+@pytest.fixture(scope="module")
+def egg():
+    surface = ellipsoid((1.0, 0.6, 0.35), 4)
+    return surface.with_points(surface.points / surface.diagonal)
+
+
+def unit_torus(n_major=90, n_minor=36):
+    surface = torus(1.0, 0.4, n_major, n_minor)
+    return surface.with_points(surface.points / surface.diagonal)
+
+
+def test_the_default_network_is_there_and_says_what_it_is():
+    assert "default" in shipped_weights()
+    network, facts = load_weights(weights_path(None))
+    assert network.options.scales >= 3
+    assert {"epoch", "validation 0", "training"} <= set(facts)
+    assert weights_path("default") == weights_path(None)
+
+
+@pytest.mark.parametrize("embedding", ["neural", "hybrid"])
+def test_a_smooth_shape_is_remeshed_as_well_as_directly(egg, embedding):
+    measured = {}
+    for name in ("direct", embedding):
+        result = anisomesh.remesh(egg, n_vertices=400, embedding=name)
+        assert result.surface.n_points == 400
+        assert result.noise == 0.0
+        assert not result.validity.flipped
+        measured[name] = evaluate(egg, result.surface, samples=20_000)
+    assert measured[embedding].shape.g_mean > measured["direct"].shape.g_mean - 0.04
+    assert measured[embedding].distance.rms < 1.15 * measured["direct"].distance.rms
+
+
+@pytest.mark.parametrize("size", [0.1, 0.3, 0.5])
+def test_noise_is_taken_away(size):
+    clean = unit_torus()
+    noisy = with_noise(clean, size, np.random.default_rng(0))
+    found = predict(noisy)
+    assert found.noise == pytest.approx(size, rel=0.4)
+    measured = {}
+    for name in ("direct", "hybrid"):
+        result = anisomesh.remesh(noisy, n_vertices=600, embedding=name)
+        measured[name] = evaluate(clean, result.surface, samples=20_000)
+    assert measured["hybrid"].shape.g_mean > measured["direct"].shape.g_mean + 0.02
+    assert measured["hybrid"].distance.rms < measured["direct"].distance.rms
+
+
+def test_noise_stays_where_that_is_asked_for(egg):
+    noisy = with_noise(egg, 0.3, np.random.default_rng(0))
+    result = anisomesh.remesh(noisy, n_vertices=300, embedding="neural", denoise=False, max_iterations=20)
+    assert result.noise == 0.0
+    np.testing.assert_allclose(result.frame.to_model(result.working.points[: noisy.n_points]), noisy.points, atol=1e-9)
+    taken = anisomesh.remesh(noisy, n_vertices=300, embedding="neural", max_iterations=20)
+    assert taken.noise > 2.0 * NOISE_FLOOR
+    assert taken.report()["noise"] == taken.noise
+    assert any("noise" in warning for warning in taken.warnings)
+
+
+def test_little_noise_and_creases_stay():
+    for surface in (twisted_ring(), with_noise(unit_torus(), 0.01, np.random.default_rng(0))):
+        found = predict(surface.with_points(surface.points / surface.diagonal))
+        assert found.noise == 0.0
+
+
+@pytest.mark.parametrize("surface", [box(n=1), sphere(0)])
+def test_meshes_of_few_points_have_graphs_without_edges(surface):
+    found = predict(surface.with_points(surface.points / surface.diagonal))
+    assert found.tensors.shape == (surface.n_points, 3, 3)
+    assert np.isfinite(found.tensors).all()
+    assert np.isfinite(found.points).all()
+
+
+def test_the_embedding_that_is_left_open_is_hybrid_for_the_curvature_metric(egg):
+    tensors = np.tile(np.eye(3), (egg.n_points, 1, 1))
+    for metric, wanted in (("curvature", "hybrid"), ("approximation", "direct"), (tensors, "direct")):
+        result = anisomesh.remesh(egg, n_vertices=100, metric=metric, max_iterations=3)
+        assert result.embedded == wanted
+        assert result.report()["embedding"] == wanted
+
+
+def test_the_hybrid_metric_is_between_the_two(egg):
+    options = {"n_vertices": 100, "max_iterations": 0}
+    means = {
+        kind: anisomesh.remesh(egg, embedding=kind, **options).embedding.stretch.asked_mean
+        for kind in ("direct", "neural", "hybrid")
+    }
+    low, high = sorted([means["direct"], means["neural"]])
+    assert low - 0.05 < means["hybrid"] < high + 0.05
+
+
+def test_weights_and_devices_that_are_not_there(egg, tmp_path):
+    for words, kind, message in (
+        ({"embedding": "neural", "weights": tmp_path / "none"}, WeightsError, "none"),
+        ({"embedding": "direct", "weights": "default"}, OptionError, "embedding 'direct' has none"),
+        ({"embedding": "neural", "device": "tpu"}, OptionError, "expected one of cpu, cuda"),
+        ({"embedding": "hybrid", "metric": "uniform"}, OptionError, "takes no other"),
+    ):
+        with pytest.raises(kind, match=message):
+            anisomesh.remesh(egg, n_vertices=100, **words)
+    if not torch.cuda.is_available():
+        with pytest.raises(OptionError, match="'cuda' cannot be used here"):
+            anisomesh.remesh(egg, n_vertices=100, embedding="neural", device="cuda")
+
+
+def test_the_command_takes_the_shipped_network(egg, tmp_path, run_cli):
+    anisomesh.save(egg, tmp_path / "in.ply")
+    done = run_cli("remesh", tmp_path / "in.ply", "-o", tmp_path / "out.ply", "-n", 200, "--embedding", "hybrid")
+    assert done.returncode == 0, done.stderr
+    assert anisomesh.load(tmp_path / "out.ply").n_points == 200
