@@ -13,7 +13,7 @@ from anisomesh.batch import methods
 from anisomesh.batch.runs import read_rows, run_suite
 from anisomesh.batch.suite import parse_suite
 from anisomesh.batch.tables import markdown, run_table, web_page
-from anisomesh.errors import AnisomeshError
+from anisomesh.errors import AnisomeshError, OptionError
 from anisomesh.surface.io import save
 from anisomesh.surface.mesh import Surface
 from anisomesh.surface.shapes import box, open_patch, sphere
@@ -109,6 +109,39 @@ def test_other_options_are_run_again(tmp_path):
     assert rows[0]["facts"]["iterations"] == 4
 
 
+def test_methods_are_given_worse_meshes_and_compared_with_the_clean_one(tmp_path, monkeypatch):
+    given = {}
+
+    def unchanged(surface, n, seed, options):
+        given[len(given)] = surface
+        return methods.Produced(surface, {})
+
+    monkeypatch.setitem(methods.METHODS, "acvd", methods.Remesher(unchanged))
+    inputs = ["clean", "noise 0.1", "noise 0.3", "stretched"]
+    three = suite(shapes=["sphere:640"], inputs=inputs, methods=[{"name": "none", "method": "acvd"}])
+    rows = run_suite(three, tmp_path / "rows")
+    assert [row["input"] for row in rows] == inputs
+    assert [row["asked"] for row in rows] == 4 * [round(0.5 * given[0].n_points)]
+    far = [row["evaluation"]["distance"]["rms"] for row in rows]
+    assert far[0] < 1e-9
+    assert far[0] < far[1] < far[2]
+    away = given[1].points - given[0].points
+    assert away.std() == pytest.approx(0.1 * given[0].edge_lengths.mean(), rel=0.1)
+    assert rows[3]["evaluation"]["shape"]["g_mean"] < rows[0]["evaluation"]["shape"]["g_mean"]
+    again = run_suite(three, tmp_path / "others")
+    assert [row["evaluation"] for row in again] == [row["evaluation"] for row in rows]
+    assert "50% of noise 0.3" in markdown(three, rows)
+    older = {key: value for key, value in rows[0].items() if key != "input"}
+    (tmp_path / "older").write_text(json.dumps(older) + "\n")
+    steps = []
+    run_suite(suite(shapes=["sphere:640"], methods=three_methods(three)), tmp_path / "older", on_row=steps.append)
+    assert not steps
+
+
+def three_methods(some):
+    return [{"name": method.name, "method": method.method} for method in some.methods]
+
+
 def test_failures_and_missing_packages_are_rows(tmp_path, monkeypatch):
     def broken(surface, n, seed, options):
         raise ZeroDivisionError("no luck")
@@ -181,3 +214,32 @@ def test_list_and_errors(run_cli, tmp_path):
     unknown = run_cli("benchmark", "smok", "-o", tmp_path)
     assert unknown.returncode == 1
     assert "did you mean 'smoke'" in unknown.stderr
+
+
+def test_a_suite_trains_the_networks_that_it_compares(tmp_path, run_cli):
+    pytest.importorskip("torch")
+    from anisomesh.dataset.build import build, sources_of
+    from anisomesh.dataset.make import Recipe
+
+    build(sources_of(None, 6), tmp_path / "items", Recipe(target=200, variants=()), validation=0.4)
+    training = {"epochs": 2, "network": {"channels": 8, "scales": 2, "blocks": 1, "heads": 1}}
+    paper = {"epochs": 1, "paper": {"channels": 8, "levels": 2}}
+    neural = {"method": "anisomesh", "options": {"embedding": "neural", "max_iterations": 3}}
+    ours, theirs = ({"name": n, **neural, "training": t} for n, t in (("ours 1", training), ("theirs", paper)))
+    wanted = suite(shapes=["ring:300"], methods=[ours, theirs])
+    with pytest.raises(OptionError, match="name a data set with --items"):
+        run_suite(wanted, tmp_path / "rows.jsonl")
+    told, steps = [], []
+    rows = run_suite(wanted, tmp_path / "rows.jsonl", items=tmp_path / "items", on_epoch=told.append)
+    assert [row["status"] for row in rows] == ["done", "done"]
+    assert [text.split(",")[0] for text in told] == [
+        "ours 1: epoch 1 of 2",
+        "ours 1: epoch 2 of 2",
+        "theirs: epoch 1 of 1",
+    ]
+    assert {path.parent.name for path in (tmp_path / "rows").glob("*/weights.safetensors")} == {"ours-1", "theirs"}
+    run_suite(wanted, tmp_path / "rows.jsonl", on_row=steps.append)
+    assert not steps
+    wrong = suite(methods=[{**ours, "training": {"epoch": 2}}])
+    with pytest.raises(OptionError, match="did you mean 'epochs'"):
+        run_suite(wrong, tmp_path / "others.jsonl", items=tmp_path / "items")

@@ -7,6 +7,7 @@ from anisomesh.batch.suite import load_suite, parse_suite, shipped_suites
 from anisomesh.errors import OptionError
 from anisomesh.options import RemeshOptions
 
+LEARNING = ("ablation-loss", "ablation-laplacian", "networks")
 TABLE = {"shapes": ["sphere:100"], "methods": [{"name": "ours", "method": "anisomesh"}]}
 
 
@@ -24,7 +25,18 @@ def test_shipped_suites_load_and_their_shapes_and_options_exist(name):
 
 
 def test_all_suites_of_the_paper_are_there():
-    assert set(shipped_suites()) >= {"smoke", "table1", "rocker-fertility", "zeroshot", "torus", "timing"}
+    plain = {"smoke", "table1", "rocker-fertility", "zeroshot", "torus", "timing", "noise", "neural"}
+    assert set(shipped_suites()) >= plain | set(LEARNING)
+
+
+@pytest.mark.parametrize("name", LEARNING)
+def test_networks_of_shipped_suites_can_be_trained(name):
+    pytest.importorskip("torch")
+    from anisomesh.learn.config import parse_training
+
+    for method in load_suite(name).methods:
+        assert method.options["embedding"] == "neural"
+        parse_training(name, {"data": "items", "out": "out", **method.training})
 
 
 @pytest.mark.parametrize(
@@ -33,6 +45,9 @@ def test_all_suites_of_the_paper_are_there():
         ({"ratio": [1.0]}, "did you mean 'ratios'"),
         ({"ratios": 1.0}, "expected a list"),
         ({"ratios": [0.0]}, "must be positive"),
+        ({"inputs": ["noisy"]}, "expected 'clean', 'stretched', or 'noise' and a size"),
+        ({"inputs": ["noise -1"]}, "expected 'clean'"),
+        ({"inputs": ["noise nan"]}, "expected 'clean'"),
         ({"methods": []}, "no method"),
         ({"shapes": []}, "no mesh"),
         ({"methods": [{"name": "x", "method": "anisomeshh"}]}, "did you mean 'anisomesh'"),

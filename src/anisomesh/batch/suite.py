@@ -7,26 +7,40 @@ from importlib import resources
 from pathlib import Path
 from typing import Any
 
+from anisomesh.batch.disturb import CLEAN, check_disturbance
 from anisomesh.batch.methods import METHODS
 from anisomesh.errors import OptionError
 from anisomesh.toml import check_keys, hint, parse_toml
 
-_KEYS = {"description", "meshes", "shapes", "closed", "ratios", "seeds", "samples", "methods"}
-_METHOD_KEYS = {"name", "method", "options"}
+_KEYS = {"description", "meshes", "shapes", "closed", "inputs", "ratios", "seeds", "samples", "methods"}
+_METHOD_KEYS = {"name", "method", "options", "training"}
 
 
 @dataclass(frozen=True, kw_only=True)
 class Method:
-    """A way to remesh: the name of its row, which method, and the options that it takes."""
+    """A way to remesh.
+
+    Attributes
+    ----------
+    name
+        Of its row.
+    method
+        Which method, by its name in :data:`anisomesh.batch.methods.METHODS`.
+    options
+        What it takes.
+    training
+        How a network is trained whose weights are an option besides, as :mod:`anisomesh.learn.config` reads it.
+    """
 
     name: str
     method: str
     options: dict[str, Any] = field(default_factory=dict)
+    training: dict[str, Any] | None = None
 
 
 @dataclass(frozen=True, kw_only=True)
 class Suite:
-    """Runs of every method on every mesh at every ratio with every seed.
+    """Runs of every method on every mesh, as it is or made worse, at every ratio with every seed.
 
     Attributes
     ----------
@@ -38,6 +52,10 @@ class Suite:
         Meshes made by code, ``name:size``, see :func:`anisomesh.batch.inputs.make_shape`.
     closed
         Whether meshes with a boundary are left out.
+    inputs
+        What the methods are given: ``"clean"``, the mesh as it is; ``"noise SIZE"``, with noise of this deviation in
+        mean edge lengths on every coordinate; ``"stretched"``, with other triangles, stretched in a random direction.
+        Results are always compared with the clean mesh.
     ratios
         Vertices of the results per vertex of the prepared input.
     seeds
@@ -53,6 +71,7 @@ class Suite:
     meshes: tuple[str, ...] = ()
     shapes: tuple[str, ...] = ()
     closed: bool = False
+    inputs: tuple[str, ...] = (CLEAN,)
     ratios: tuple[float, ...] = (1.0,)
     seeds: tuple[int, ...] = (0,)
     samples: int = 100_000
@@ -61,6 +80,8 @@ class Suite:
     def __post_init__(self) -> None:
         if not min(self.ratios) > 0.0 or self.samples < 1:
             raise OptionError(f"{self.name}: ratios and samples must be positive")
+        for name in self.inputs:
+            check_disturbance(f"{self.name}: inputs", name)
 
 
 def shipped_suites() -> list[str]:
@@ -109,6 +130,7 @@ def parse_suite(name: str, table: dict[str, Any]) -> Suite:
         meshes=tuple(_list(name, table, "meshes", str)),
         shapes=tuple(_list(name, table, "shapes", str)),
         closed=bool(table.get("closed", False)),
+        inputs=tuple(_list(name, table, "inputs", str)) or (CLEAN,),
         ratios=tuple(float(ratio) for ratio in _list(name, table, "ratios", int | float)) or (1.0,),
         seeds=tuple(_list(name, table, "seeds", int)) or (0,),
         samples=int(table.get("samples", 100_000)),
@@ -126,7 +148,8 @@ def _method(suite: str, entry: dict[str, Any]) -> Method:
         raise OptionError(
             f"{suite}: method {method!r} is unknown{hint(method, list(METHODS))}; expected one of {', '.join(METHODS)}"
         )
-    return Method(name=str(entry.get("name", method)), method=method, options=dict(entry.get("options", {})))
+    options, training = dict(entry.get("options", {})), entry.get("training")
+    return Method(name=str(entry.get("name", method)), method=method, options=options, training=training)
 
 
 def _list(suite: str, table: dict[str, Any], key: str, kind: Any) -> list[Any]:

@@ -5,11 +5,13 @@ from __future__ import annotations
 import html
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from itertools import product
 from typing import Any
 
 import numpy as np
 
-from anisomesh.batch.runs import Row
+from anisomesh.batch.disturb import CLEAN
+from anisomesh.batch.runs import Row, chosen
 from anisomesh.batch.suite import Suite
 
 
@@ -80,24 +82,28 @@ def faults(row: Row) -> list[str]:
 
 
 def mean_table(suite: Suite, rows: Sequence[Row]) -> tuple[list[str], list[list[str]]]:
-    """Return heading and lines of the means over meshes and seeds, by ratio and method.
+    """Return heading and lines of the means over meshes and seeds, by input, ratio and method.
 
     Distances are averaged geometrically, everything else arithmetically; figures that are not defined for a mesh (ECD
     without creases) are left out of the mean. Runs that failed, and results that are not valid, are counted.
     """
     heading = ["vertices", "method", "runs", *(column.heading for column in COLUMNS), "failed", "not valid"]
     lines = []
-    for ratio in suite.ratios:
-        for method in suite.methods:
-            group = [row for row in rows if row["ratio"] == ratio and row["method"] == method.name]
-            done = [row for row in group if row["status"] == "done"]
-            if not any(row["status"] in ("done", "failed") for row in group):
-                continue
-            figures = [_mean(column, done) for column in COLUMNS]
-            failed = sum(row["status"] == "failed" for row in group)
-            invalid = sum(bool(faults(row)) for row in done)
-            lines.append([f"{ratio:.0%}", method.name, str(len(done)), *figures, str(failed), str(invalid)])
+    for given, ratio, method in product(suite.inputs, suite.ratios, suite.methods):
+        group = chosen(rows, given, ratio, method.name)
+        done = [row for row in group if row["status"] == "done"]
+        if not any(row["status"] in ("done", "failed") for row in group):
+            continue
+        figures = [_mean(column, done) for column in COLUMNS]
+        failed = sum(row["status"] == "failed" for row in group)
+        invalid = sum(bool(faults(row)) for row in done)
+        lines.append([_vertices(given, ratio), method.name, str(len(done)), *figures, str(failed), str(invalid)])
     return heading, lines
+
+
+def _vertices(given: str, ratio: float) -> str:
+    """Return the ratio of a row, and its input where that is not the clean mesh."""
+    return f"{ratio:.0%}" if given == CLEAN else f"{ratio:.0%} of {given}"
 
 
 def run_table(rows: Sequence[Row]) -> tuple[list[str], list[list[str]]]:
@@ -105,7 +111,7 @@ def run_table(rows: Sequence[Row]) -> tuple[list[str], list[list[str]]]:
     heading = ["mesh", "vertices", "method", "seed", *(column.heading for column in COLUMNS), "remarks"]
     lines = []
     for row in rows:
-        names = [row["mesh"], f"{row['ratio']:.0%}", row["method"], str(row["seed"])]
+        names = [row["mesh"], _vertices(row.get("input", CLEAN), row["ratio"]), row["method"], str(row["seed"])]
         if row["status"] == "done":
             figures, remark = [_shown(column.value(row), column.digits) for column in COLUMNS], ", ".join(faults(row))
         else:
