@@ -23,7 +23,7 @@ def stretch_along_z():
 
 
 def test_every_example_is_tested():
-    assert {path.stem for path in FOLDER.glob("*.py")} == {"remesh_a_surface", "own_metric", "gallery"}
+    assert {path.stem for path in FOLDER.glob("*.py")} == {"remesh_a_surface", "own_metric", "gallery", "noisy_scan"}
 
 
 def test_remesh_a_surface(tmp_path, capsys, torus_obj):
@@ -50,3 +50,15 @@ def test_gallery_draws_the_results(tmp_path, capsys):
     with Image.open(tmp_path / "three.png") as image:
         assert image.width == 2 * 3 * 480
     assert "three.png" in capsys.readouterr().out
+
+
+def test_noisy_scan_is_better_with_the_network(tmp_path, capsys):
+    pytest.importorskip("torch")
+    example("noisy_scan").main(str(tmp_path / "noisy.png"))
+    assert (tmp_path / "noisy.png").stat().st_size > 10_000
+    direct, hybrid = (
+        [float(word) for word in line.replace("e-4", "").replace(",", "").split() if word.replace(".", "").isdigit()]
+        for line in capsys.readouterr().out.splitlines()[:2]
+    )
+    assert hybrid[0] > direct[0] + 0.05  # G
+    assert hybrid[1] < 0.8 * direct[1]  # RMS

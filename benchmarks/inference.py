@@ -1,0 +1,104 @@
+"""Seconds and memory from a mesh to its embedding against its size, on one core: neural and direct.
+
+Usage: python benchmarks/inference.py [--largest 1000000] [--data DIR] [--out benchmarks/out/inference.png]
+
+Rings made by code, and the meshes of DIR/test and DIR/zeroshot (ANISOMESH_DATA); the picture shows them as the paper's
+figure of timings does, coloured by their mean stretch.
+"""
+
+from __future__ import annotations
+
+import argparse
+import os
+import resource
+import time
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from anisomesh.batch.inputs import make_shape
+from anisomesh.embedding.direct import embed
+from anisomesh.isolation import isolated
+from anisomesh.learn.predict import predict
+from anisomesh.metric.tensor import compute_metric
+from anisomesh.surface.geometry import unit_frame
+from anisomesh.surface.io import load
+from anisomesh.surface.mesh import Surface
+from anisomesh.surface.prepare import prepare
+
+SIZES = (1_000, 3_000, 10_000, 30_000, 100_000, 300_000, 1_000_000)
+STEPS = 10
+MOST = 200_000  # points of a mesh of the data folder
+
+
+def measured(surface: Surface, kind: str) -> dict[str, Any]:
+    """Return the seconds of a metric and of its embedding, peak memory, and the mean stretch, in this process."""
+    unit = surface.with_points(unit_frame(surface.points).to_unit(surface.points))
+    if kind == "neural":
+        predict(make_shape("ring:1000"))  # what is loaded and compiled once
+    before = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss
+    start = time.perf_counter()
+    tensors = predict(unit, denoise=False).tensors if kind == "neural" else compute_metric(unit).tensors
+    middle = time.perf_counter()
+    peak = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss
+    embedding = embed(unit, tensors, max_iterations=STEPS)
+    end = time.perf_counter()
+    kilobytes = (peak - before) / surface.n_points
+    seconds = {"metric": middle - start, "embedding": end - middle}
+    return {"points": surface.n_points, **seconds, "kB": kilobytes, "stretch": embedding.stretch.achieved_mean}
+
+
+def show(rows: list[dict[str, Any]], path: Path) -> None:
+    from matplotlib.backends.backend_agg import FigureCanvasAgg
+    from matplotlib.figure import Figure
+
+    figure: Any = Figure(figsize=(9.0, 4.0), layout="constrained", dpi=150)
+    FigureCanvasAgg(figure)
+    panels = figure.subplots(1, 2, sharey=True)
+    for panel, kind in zip(panels, ("neural", "direct"), strict=True):
+        some = [row for row in rows if row["kind"] == kind]
+        seconds = [row["metric"] + row["embedding"] for row in some]
+        marks = panel.scatter(
+            [row["points"] for row in some], seconds, c=[row["stretch"] for row in some], vmin=1.0, vmax=6.0, s=14
+        )
+        panel.set(xscale="log", yscale="log", xlabel="points", title=f"{kind}: metric and embedding")
+        panel.grid(which="both", color="#e6e6e6", linewidth=0.6)
+        panel.set_axisbelow(True)
+    panels[0].set_ylabel("seconds, one core")
+    figure.colorbar(marks, ax=panels, label="mean stretch")
+    path.parent.mkdir(parents=True, exist_ok=True)
+    figure.savefig(path)
+
+
+def main() -> None:
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("--largest", type=int, default=SIZES[-1])
+    parser.add_argument("--data", type=Path, default=os.environ.get("ANISOMESH_DATA"))
+    parser.add_argument("--out", type=Path, default=Path("benchmarks/out/inference.png"))
+    asked = parser.parse_args()
+    rows = []
+    print(f"load {os.getloadavg()[0]:.2f}")
+    print("| mesh | points | from | metric, s | embedding, s | metric, kB a point |\n|---|---|---|---|---|---|")
+    meshes = [(f"ring:{n}", None) for n in SIZES if n <= asked.largest]
+    if asked.data is not None:
+        meshes += [(p.name, p) for folder in ("test", "zeroshot") for p in sorted(asked.data.glob(f"{folder}/*.ply"))]
+    for name, path in meshes:
+        surface = make_shape(name) if path is None else prepare(load(path)).surface
+        if path is not None and surface.n_points > MOST:
+            continue
+        for kind in ("neural", "direct"):
+            row = {"kind": kind, **isolated(measured)(surface, kind)}
+            rows.append(row)
+            numbers = f"{row['metric']:.3f} | {row['embedding']:.3f} | {row['kB']:.1f}"
+            print(f"| {name} | {row['points']:,} | {kind} | {numbers} |", flush=True)
+    for kind in ("neural", "direct"):
+        sizes, seconds = np.array(
+            [(r["points"], r["metric"]) for r in rows if r["kind"] == kind and r["points"] > 9_000]
+        ).T
+        print(f"{kind}: metric ~ points^{np.polyfit(np.log(sizes), np.log(seconds), 1)[0]:.2f} above 9,000 points")
+    show(rows, asked.out)
+
+
+if __name__ == "__main__":
+    main()
