@@ -72,7 +72,7 @@ def remesh(
         Instead of ``n_vertices``: vertices as a share of those of the prepared input.
     max_error
         Instead of ``n_vertices``: the largest distance between the surfaces, both ways, in model units. The smallest
-        number of vertices that does is searched for, to 3 %, by remeshing several times.
+        number of vertices that does is searched for, to 3 %, by remeshing several times; noise is not taken away.
     options
         See :class:`RemeshOptions`; keyword arguments of the same names take precedence.
     on_step
@@ -113,6 +113,7 @@ def remesh(
         if not isinstance(wanted, str):
             wanted = _at_prepared(np.asarray(wanted), given, prepared)
     if max_error is not None:
+        options = replace(options, denoise=False)  # the distance asked for is from the input as it is
 
         def with_vertices(n: int) -> RemeshResult:
             run.on_step(StepInfo(stage="search", message=f"{n:,} vertices"))

@@ -72,6 +72,14 @@ def test_noise_stays_where_that_is_asked_for(egg):
     assert any("noise" in warning for warning in taken.warnings)
 
 
+def test_an_error_from_the_noisy_input_leaves_the_noise(egg):
+    noisy = with_noise(egg, 0.3, np.random.default_rng(0))
+    error = 0.03
+    result = anisomesh.remesh(noisy, max_error=error, embedding="neural", max_iterations=10)
+    assert result.noise == 0.0
+    assert result.distance <= error
+
+
 def test_little_noise_and_creases_stay():
     for surface in (twisted_ring(), with_noise(unit_torus(), 0.01, np.random.default_rng(0))):
         found = predict(surface.with_points(surface.points / surface.diagonal))

@@ -70,8 +70,8 @@ def run_suite(
     rows
         With the keys ``mesh, input, ratio, method, seed``; ``options`` of the method; ``status``, one of ``done``,
         ``failed`` with ``error``, and ``absent`` where a package of the method is missing; ``asked`` vertices, wall
-        ``seconds``, the ``facts`` of the method and the ``evaluation``. Failed runs are not tried
-        again, absent ones are.
+        ``seconds``, the ``facts`` of the method and the ``evaluation``. Failed runs are not tried again, absent ones
+        are.
 
     Raises
     ------

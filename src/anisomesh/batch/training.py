@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import replace
 from pathlib import Path
 
 from anisomesh.batch.suite import Suite
@@ -52,6 +51,6 @@ def trained(
         def tell(row: dict[str, object], name: str = method.name, epochs: int = options.epochs) -> None:
             on_epoch(f"{name}: epoch {row['epoch']} of {epochs}, loss {row['loss']:.4f}")
 
-        train(replace(options, out=str(folder)), files, resume=(folder / CHECKPOINT).exists(), on_row=tell)
+        train(options, files, resume=(folder / CHECKPOINT).exists(), on_row=tell)
         found[method.name] = folder / WEIGHTS
     return found

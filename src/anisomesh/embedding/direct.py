@@ -11,6 +11,7 @@ from anisomesh.embedding.gradient import FaceGradient, FaceTensors, eigen_2x2, f
 from anisomesh.embedding.poisson import poisson_solver
 from anisomesh.embedding.polar import polar_factors
 from anisomesh.errors import OptionError
+from anisomesh.surface.geometry import sums_at_points
 from anisomesh.surface.mesh import Surface
 
 _POSITION_SHARE = 0.01
@@ -119,9 +120,8 @@ def mean_bend(surface: Surface, gradient: FaceGradient) -> PointScalars:
     """Return the divergence of the point normals, twice the mean curvature (V,), averaged over the faces at a point."""
     bend = (gradient.operator @ surface.point_normals).reshape(surface.n_faces, 2, 3)
     divergence = gradient.areas * np.einsum("fkx,fkx->f", bend, gradient.frames)
-    corners = surface.faces.ravel()
-    total = np.bincount(corners, np.repeat(divergence, 3), minlength=surface.n_points)
-    areas = np.bincount(corners, np.repeat(gradient.areas, 3), minlength=surface.n_points)
+    total = sums_at_points(divergence, surface.faces, surface.n_points)
+    areas = sums_at_points(gradient.areas, surface.faces, surface.n_points)
     return np.divide(total, areas, out=np.zeros_like(total), where=areas > 0.0)
 
 

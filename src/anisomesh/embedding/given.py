@@ -7,6 +7,7 @@ import numpy as np
 from anisomesh._arrays import EmbeddedPoints, PointTensors
 from anisomesh.embedding.base import Embedding, EmbeddingStatus, stretch_statistics
 from anisomesh.embedding.gradient import face_gradient
+from anisomesh.surface.geometry import sums_at_points
 from anisomesh.surface.mesh import Surface
 
 
@@ -33,9 +34,6 @@ def pulled_back_metric(surface: Surface, extra: EmbeddedPoints) -> PointTensors:
     slopes = (gradient.operator @ extra).reshape(surface.n_faces, 2, -1)
     in_space = np.einsum("fkx,fkc->fxc", gradient.frames, slopes)
     weighted = gradient.areas[:, None, None] * (in_space @ in_space.transpose(0, 2, 1))
-    corners = surface.faces.ravel()
-    flat = np.repeat(weighted.reshape(surface.n_faces, 9), 3, axis=0)
-    total = np.stack([np.bincount(corners, column, minlength=surface.n_points) for column in flat.T], axis=1)
-    area = np.bincount(corners, np.repeat(gradient.areas, 3), minlength=surface.n_points)
-    mean = np.divide(total, area[:, None], out=np.zeros_like(total), where=area[:, None] > 0.0)
-    return np.asarray(np.eye(3) + mean.reshape(-1, 3, 3))
+    total = sums_at_points(weighted, surface.faces, surface.n_points)
+    area = sums_at_points(gradient.areas, surface.faces, surface.n_points)[:, None, None]
+    return np.asarray(np.eye(3) + np.divide(total, area, out=np.zeros_like(total), where=area > 0.0))

@@ -5,14 +5,13 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-import numpy.typing as npt
 import torch
 from torch import Tensor
 
 from anisomesh.learn.items import Item
 from anisomesh.learn.lines import directions_of, lines_in
 from anisomesh.learn.pyramid import Pyramid, pyramid
-from anisomesh.surface.mesh import Surface
+from anisomesh.surface.geometry import sums_at_points
 from anisomesh.surface.noise import Noise, with_noise
 
 _UNTRUSTED = 0.1  # weight of points whose curvature is not known well
@@ -76,9 +75,10 @@ def example_of(
     noisy = clean if rng is None else with_noise(clean, noise, rng, kind)
     directions, logarithms = directions_of(item.tensors)
     scales = pyramid(noisy, n_scales)
-    area = _at_points(clean, clean.face_areas)
+    area = sums_at_points(clean.face_areas, clean.faces, clean.n_points)
     normals = clean.face_normals
-    quadrics = _at_points(clean, clean.face_areas[:, None, None] * normals[:, :, None] * normals[:, None, :])
+    products = clean.face_areas[:, None, None] * normals[:, :, None] * normals[:, None, :]
+    quadrics = sums_at_points(products, clean.faces, clean.n_points)
     weight = area * np.where(item.trusted, 1.0, _UNTRUSTED)
     unit = float(clean.edge_lengths.mean())
     return Example(
@@ -90,11 +90,3 @@ def example_of(
         weight=torch.from_numpy((weight / weight.sum()).astype(np.float32)),
         unit=unit,
     )
-
-
-def _at_points(surface: Surface, values: npt.NDArray[np.float64]) -> npt.NDArray[np.float64]:
-    """Return the sums of values of faces (F, ...) at the points of their corners (V, ...)."""
-    flat = np.repeat(values.reshape(surface.n_faces, -1), 3, axis=0)
-    corners = surface.faces.ravel()
-    sums = [np.bincount(corners, column, minlength=surface.n_points) for column in flat.T]
-    return np.stack(sums, axis=1).astype(np.float64).reshape(surface.n_points, *values.shape[1:])

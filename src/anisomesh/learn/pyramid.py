@@ -10,7 +10,7 @@ import numpy.typing as npt
 
 from anisomesh.learn.graph import Graph, Level, graph_of, hierarchy
 from anisomesh.metric.tangent import tangent_frames
-from anisomesh.surface.geometry import unit
+from anisomesh.surface.geometry import sums_at_points, unit
 from anisomesh.surface.mesh import Surface
 
 N_NODE, N_EDGE = 13, 7
@@ -109,7 +109,7 @@ def pyramid(surface: Surface, n_scales: int) -> Pyramid:
     n = surface.n_points
     start, end = np.concatenate([surface.edges, surface.edges[:, ::-1]]).T
     base = graph_of(n, start, end, np.zeros((len(start), 1), dtype=np.float32))
-    weight = np.bincount(surface.faces.ravel(), np.repeat(surface.face_areas, 3), minlength=n)
+    weight = sums_at_points(surface.face_areas, surface.faces, n)
     weight = np.maximum(weight, 1e-12 * max(float(weight.max()), 1e-30))
     values = np.concatenate([surface.points, surface.point_normals, np.ones((n, 1))], axis=1)
     sums = np.asarray(weight[:, None] * values, dtype=np.float64)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 from typing import Any
 
@@ -65,6 +66,13 @@ class Frame:
     def to_model(self, points: npt.NDArray[Any]) -> npt.NDArray[np.float64]:
         """Map points (n, 3) back to model units."""
         return np.asarray(points * self.scale + self.centre)
+
+
+def sums_at_points(values: npt.NDArray[np.float64], faces: Faces, n_points: int) -> npt.NDArray[np.float64]:
+    """Return the sums of values of faces (F, ...) over the faces at each point (V, ...)."""
+    flat, corners = np.repeat(values.reshape(len(faces), math.prod(values.shape[1:])), 3, axis=0), faces.ravel()
+    sums = [np.bincount(corners, column, minlength=n_points) for column in flat.T]
+    return np.stack(sums, axis=1).astype(np.float64).reshape(n_points, *values.shape[1:])
 
 
 def unit_frame(points: Points) -> Frame:
