@@ -6,10 +6,10 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from scipy import sparse
 
+from anisomesh._kernels.local_step import local_step
 from anisomesh.embedding.gradient import eigen_2x2, face_gradient, face_tensors
 from anisomesh.embedding.ordering import nested_dissection
 from anisomesh.embedding.poisson import factorise, poisson_solver
-from anisomesh.embedding.polar import polar_factors
 from anisomesh.surface.mesh import Surface
 from anisomesh.surface.shapes import ellipsoid, open_patch, sphere, torus
 
@@ -21,45 +21,66 @@ def two_shapes():
     return Surface(points, np.concatenate([ball.faces, patch.faces + ball.n_points + 1])), ball.n_points
 
 
-@given(seed=st.integers(0, 2**31), k=st.integers(2, 6))
+def polar(maps, frames):
+    """Return the polar factors of maps (F, 2, k): the local step towards gradients that keep lengths."""
+    factors = np.empty_like(maps)
+    local_step(maps, np.tile(np.eye(2), (len(maps), 1, 1)), frames, np.ones(len(maps)), factors)
+    return factors
+
+
+@given(seed=st.integers(0, 2**31), k=st.integers(3, 6))
 @settings(max_examples=30)
 def test_polar_factor_is_the_one_of_the_singular_value_decomposition(seed, k):
     rng = np.random.default_rng(seed)
     maps = rng.standard_normal((40, 2, k)) * 10.0 ** rng.uniform(-6, 6, (40, 1, 1))
     maps[:, 1] *= 10.0 ** rng.uniform(-4, 0, (40, 1))
     left, _, right = np.linalg.svd(maps, full_matrices=False)
-    np.testing.assert_allclose(polar_factors(maps, np.zeros_like(maps)), left @ right, atol=1e-8)
+    np.testing.assert_allclose(polar(maps, np.zeros((len(maps), 2, 3))), left @ right, atol=1e-8)
 
 
 def test_polar_factor_of_a_nearly_deficient_map_is_orthonormal():
     maps = np.random.default_rng(0).standard_normal((200, 2, 5))
     maps[:, 1] = maps[:, 0] + 1e-8 * maps[:, 1]
-    factor = polar_factors(maps, np.zeros_like(maps))
+    factor = polar(maps, np.zeros((len(maps), 2, 3)))
     np.testing.assert_allclose(factor @ factor.transpose(0, 2, 1), np.tile(np.eye(2), (200, 1, 1)), rtol=0, atol=1e-12)
 
 
-@pytest.mark.parametrize("case", ["rank one", "zero", "first zero", "second zero", "along the fallback"])
+@pytest.mark.parametrize("case", ["rank one", "zero", "first zero", "second zero", "along the frame"])
 def test_polar_factor_of_a_deficient_map_is_still_closest(case):
     rng = np.random.default_rng(1)
     maps = rng.standard_normal((50, 2, 5))
-    fallback = np.linalg.qr(rng.standard_normal((50, 5, 2)))[0].transpose(0, 2, 1)
+    frames = np.linalg.qr(rng.standard_normal((50, 3, 2)))[0].transpose(0, 2, 1)
     if case == "rank one":
         maps = rng.standard_normal((50, 2, 1)) * rng.standard_normal((50, 1, 5))
     elif case == "zero":
         maps = np.zeros_like(maps)
-    elif case == "along the fallback":
-        maps = rng.standard_normal((50, 2, 1)) * fallback[:, :1]
+    elif case == "along the frame":
+        maps = rng.standard_normal((50, 2, 1)) * np.pad(frames[:, :1], ((0, 0), (0, 0), (0, 2)))
     else:
         maps[:, ["first zero", "second zero"].index(case)] = 0.0
-    factor = polar_factors(maps, fallback)
+    factor = polar(maps, frames)
     np.testing.assert_allclose(factor @ factor.transpose(0, 2, 1), np.tile(np.eye(2), (50, 1, 1)), atol=1e-8)
     nuclear_norm = np.linalg.svd(maps, compute_uv=False).sum(axis=1)
     np.testing.assert_allclose(np.einsum("fik,fik->f", factor, maps), nuclear_norm, atol=1e-8)
 
 
-def test_polar_factor_of_nothing_is_the_fallback():
-    fallback = np.eye(5)[None, :2]
-    np.testing.assert_array_equal(polar_factors(np.zeros((1, 2, 5)), fallback), fallback)
+def test_polar_factor_of_nothing_is_the_frame():
+    np.testing.assert_array_equal(polar(np.zeros((1, 2, 5)), np.eye(3)[None, :2]), np.eye(5)[None, :2])
+
+
+@given(seed=st.integers(0, 2**31))
+@settings(max_examples=20)
+def test_local_step_is_the_nearest_gradient_of_the_wanted_lengths(seed):
+    rng = np.random.default_rng(seed)
+    jacobian, half = rng.standard_normal((30, 2, 5)), rng.standard_normal((30, 2, 2))
+    root, areas = half @ half.transpose(0, 2, 1), rng.uniform(0.1, 2.0, 30)
+    frames, target = np.tile(np.eye(3)[:2], (30, 1, 1)), np.empty((30, 2, 5))
+    square = local_step(jacobian, root, frames, areas, target)
+    np.testing.assert_allclose(target @ target.transpose(0, 2, 1), root @ root, rtol=1e-9, atol=1e-9)
+    np.testing.assert_allclose(square, (areas[:, None, None] * (jacobian - target) ** 2).sum(), rtol=1e-12)
+    rows = np.linalg.qr(rng.standard_normal((200, 30, 5, 2)))[0].swapaxes(2, 3)
+    others = ((jacobian - root @ rows) ** 2).sum(axis=(2, 3))
+    assert (((jacobian - target) ** 2).sum(axis=(1, 2)) <= others.min(axis=0) + 1e-9).all()
 
 
 @given(seed=st.integers(0, 2**31))

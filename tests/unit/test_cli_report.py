@@ -132,8 +132,8 @@ def test_quiet_progress_says_nothing(capsys):
 
 @pytest.mark.parametrize("cached", [True, False])
 def test_compilation_is_announced_only_when_it_is_going_to_happen(monkeypatch, capsys, cached):
-    warmup = SimpleNamespace(kernels_cached=lambda work: cached)
+    warmup = SimpleNamespace(kernels_cached=lambda work: cached or work == "remesh")
     monkeypatch.setitem(sys.modules, "anisomesh._kernels.warmup", warmup)
     with display.progress(quiet=False) as show:
-        display.announce_compilation(show)
+        display.announce_compilation(show, "remesh", "network")
     assert ("compiling" in capsys.readouterr().err) == (not cached)

@@ -9,6 +9,8 @@ torch = pytest.importorskip("torch")
 
 from anisomesh.learn.graph import graph_of, hierarchy  # noqa: E402
 from anisomesh.learn.messages import (  # noqa: E402
+    distance_by_gather,
+    distance_of_neighbours,
     largest_by_scatter,
     largest_of_neighbours,
     mean_by_scatter,
@@ -63,6 +65,23 @@ def test_derivatives_of_the_kernel_are_those_of_plain_torch():
     for a, b in zip(mine, theirs, strict=True):
         torch.testing.assert_close(a, b)
     assert all(grad.abs().sum() > 0 for grad in mine)
+
+
+@pytest.mark.parametrize("channels", [1, 6, 64])
+def test_distances_of_values_and_their_derivatives_are_those_of_plain_torch(channels):
+    graph = random_graph(seed=channels)
+    values = torch.randn(40, channels)
+    values[graph.neighbour[:1]] = values[graph.node[:1]]  # equal values have no direction
+    values.requires_grad_()
+    found = distance_of_neighbours(values, graph)
+    for e in range(1, 10):
+        ends = values[int(graph.node[e])], values[int(graph.neighbour[e])]
+        assert float(found[e].detach()) == pytest.approx(float((ends[0] - ends[1]).norm().detach()), abs=2e-6)
+    towards = torch.randn(len(found), 1)
+    (mine,) = torch.autograd.grad(found, values, towards)
+    (theirs,) = torch.autograd.grad(distance_by_gather(values, graph), values, towards)
+    torch.testing.assert_close(mine, theirs, rtol=1e-4, atol=1e-5)
+    assert mine.abs().sum() > 0.0
 
 
 @pytest.mark.parametrize("seed", range(3))

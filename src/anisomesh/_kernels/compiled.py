@@ -16,3 +16,4 @@ _UNCOUNTED: dict[str, Any] = {**_OPTIONS, "_nrt": False}
 kernel = njit(**_UNCOUNTED)
 inlined = njit(**_UNCOUNTED, forceinline=True)
 allocating = njit(**_COUNTED)
+summing = njit(**_UNCOUNTED, fastmath={"reassoc"})  # in any order, so several terms at once

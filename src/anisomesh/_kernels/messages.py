@@ -1,11 +1,11 @@
-"""The largest message among the neighbours of each node, channel by channel, and its derivative."""
+"""What nodes get from their neighbours, largest or mean, how far apart their values are, and the derivatives."""
 
 from __future__ import annotations
 
 import numpy as np
 import numpy.typing as npt
 
-from anisomesh._kernels.compiled import allocating, inlined, kernel
+from anisomesh._kernels.compiled import allocating, inlined, kernel, summing
 
 Floats = npt.NDArray[np.float32]
 Ints = npt.NDArray[np.int32]
@@ -167,3 +167,51 @@ def mean_back(
                 value = along[e, k]
                 for c in range(channels):
                     to_weight[k, c] += value * message[c]
+
+
+@summing
+def value_distances(first: Ints, neighbour: Ints, values: Floats, softening: float, distance: Floats) -> None:
+    """Write the distance between the values of the ends of each edge, sqrt(|values[j] - values[i]|^2 + softening).
+
+    Parameters
+    ----------
+    first, neighbour
+        As in :func:`largest_messages`.
+    values
+        Of the nodes (V, C).
+    softening
+        Positive, so that there is a derivative where values are equal.
+    distance
+        Room for the result (E,).
+    """
+    for i in range(len(first) - 1):
+        for e in range(first[i], first[i + 1]):
+            j = neighbour[e]
+            total = np.float32(softening)
+            for c in range(values.shape[1]):
+                way = values[j, c] - values[i, c]
+                total += way * way
+            distance[e] = np.sqrt(total)
+
+
+@kernel
+def distances_back(
+    first: Ints, neighbour: Ints, values: Floats, distance: Floats, gradient: Floats, to_values: Floats
+) -> None:
+    """Add the derivatives of :func:`value_distances` to ``to_values`` (V, C).
+
+    Parameters
+    ----------
+    first, neighbour, values, distance
+        As there.
+    gradient
+        Of the distances (E,).
+    """
+    for i in range(len(first) - 1):
+        for e in range(first[i], first[i + 1]):
+            j = neighbour[e]
+            share = gradient[e] / distance[e]
+            for c in range(values.shape[1]):
+                part = share * (values[j, c] - values[i, c])
+                to_values[j, c] += part
+                to_values[i, c] -= part

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from pathlib import Path
 
-from anisomesh._kernels import diagram, integrate, intersections, neighbours
+from anisomesh._kernels import diagram, integrate, intersections, local_step, messages, neighbours, pyramid
 
 _REMESH = (
     integrate.integrate_chunk,
@@ -16,9 +16,27 @@ _REMESH = (
     neighbours.displacements,
     neighbours.limit_radius,
     neighbours.walk,
+    local_step.local_step,
+)
+_NETWORK = (
+    messages.mean_messages,
+    pyramid.independent_set,
+    pyramid.edge_geometry,
+    pyramid.fit_directions,
+    pyramid.spread_at_nodes,
+    pyramid.edge_invariants,
+    pyramid.carry_to_points,
+)
+_TRAIN = (
+    *_NETWORK,
+    messages.mean_back,
+    messages.largest_messages,
+    messages.spread_back,
+    messages.value_distances,
+    messages.distances_back,
 )
 _EVALUATE = (intersections.choose_axes, intersections.sort_into_tree, intersections.find_pairs)
-ENTRY_POINTS = {"remesh": _REMESH, "evaluate": _EVALUATE}
+ENTRY_POINTS = {"remesh": _REMESH, "evaluate": _EVALUATE, "network": _NETWORK, "train": _TRAIN}
 """What each kind of work calls."""
 
 
@@ -26,11 +44,11 @@ def kernels_cached(work: str = "remesh") -> bool:
     """Return whether every kernel of this work is on disk as compiled code newer than its source, or none is needed."""
     if not hasattr(integrate.gather, "py_func"):  # compilation is switched off
         return True
-    newest = max(path.stat().st_mtime for path in Path(__file__).parent.glob("*.py"))
     for kernel in ENTRY_POINTS[work]:
         function = kernel.py_func
         pattern = f"{function.__module__.rsplit('.', 1)[-1]}.{function.__qualname__}-*.nbi"
+        changed = Path(function.__code__.co_filename).stat().st_mtime
         indices = list(Path(kernel.stats.cache_path or "").glob(pattern))
-        if not any(index.stat().st_mtime >= newest for index in indices):
+        if not any(index.stat().st_mtime >= changed for index in indices):
             return False
     return True

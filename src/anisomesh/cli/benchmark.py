@@ -52,8 +52,7 @@ def command(
     from anisomesh.surface.files import atomic_path
 
     with progress(quiet) as display:
-        announce_compilation(display)
-        announce_compilation(display, "evaluate")
+        announce_compilation(display, "remesh", "evaluate")
     out.mkdir(parents=True, exist_ok=True)
     stem = out / wanted.name
     rows = run_suite(

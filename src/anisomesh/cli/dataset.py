@@ -48,7 +48,7 @@ def build_command(
     recipe = Recipe(target=target, variants=VARIANTS if variants else (), evening=evening.value)
     sources = sources_of(source, blobs)
     with progress(quiet) as display:
-        announce_compilation(display)
+        announce_compilation(display, "remesh")
     on_row = _ignore if quiet else _print
     rows = build(sources, out, recipe, validation=validation, workers=workers, on_row=on_row)
     typer.echo(_summary(rows))

@@ -137,9 +137,12 @@ def run_remesh(
     """
     from importlib.metadata import version
 
+    from anisomesh.estimate import chosen_embedding
+    from anisomesh.options import RemeshOptions
     from anisomesh.pipeline import remesh
 
-    announce_compilation(display)
+    source = RemeshOptions(**{name: options[name] for name in ("metric", "embedding", "weights") if name in options})
+    announce_compilation(display, "remesh", *(() if chosen_embedding(source) == "direct" else ("network",)))
     result = remesh(surface, on_step=display, **options)
     report = result.report()
     seconds = report["seconds"]

@@ -123,9 +123,9 @@ def progress(quiet: bool) -> Display:
     return _Bar() if sys.stderr.isatty() else _Lines()
 
 
-def announce_compilation(display: Display, work: str = "remesh") -> None:
-    """Say so if the numeric kernels of this work are about to be compiled, which happens once per installation."""
+def announce_compilation(display: Display, *works: str) -> None:
+    """Say so if numeric kernels of these works are about to be compiled, which happens once per installation."""
     from anisomesh._kernels.warmup import kernels_cached
 
-    if not kernels_cached(work):
+    if not all(map(kernels_cached, works)):
         display.note("compiling the numeric kernels (once per installation, up to a minute) ...")

@@ -10,7 +10,7 @@ import numpy as np
 import numpy.typing as npt
 
 from anisomesh._arrays import EmbeddedPoints, FaceScalars, PointTensors
-from anisomesh.embedding.gradient import face_frames, face_gradient, face_tensors, larger_eigenvalue
+from anisomesh.embedding.gradient import FaceGradient, FaceTensors, larger_eigenvalue
 from anisomesh.surface.mesh import Surface
 
 
@@ -84,26 +84,28 @@ class Embedder(Protocol):
         ...
 
 
-def achieved_stretch(surface: Surface, embedded: EmbeddedPoints) -> FaceScalars:
-    """Return the stretch (F,) of each face between the surface and its embedding.
+def achieved_stretch(gradient: FaceGradient, embedded: EmbeddedPoints) -> FaceScalars:
+    """Return the stretch (F,) of each face between the surface of a gradient and its embedding (V, d).
 
     The stretch is the ratio of the singular values, larger over smaller, of the linear map from the plane of the
     face to the embedding; 1 for a face without area.
     """
-    gradient = face_gradient(surface)
-    jacobian = (gradient.operator @ embedded).reshape(surface.n_faces, 2, -1)
-    return _stretch(jacobian @ jacobian.transpose(0, 2, 1))
+    jacobian = (gradient.operator @ embedded).reshape(len(gradient.areas), 2, -1)
+    return asked_stretch(jacobian @ jacobian.transpose(0, 2, 1))
 
 
-def asked_stretch(surface: Surface, tensors: PointTensors) -> FaceScalars:
-    """Return the stretch (F,) that metric tensors (V, 3, 3) ask of each face; 1 for a face without area."""
-    return _stretch(face_tensors(surface, tensors, face_frames(surface)))
+def asked_stretch(metric: FaceTensors) -> FaceScalars:
+    """Return the stretch (F,) that a metric in the planes of the faces (F, 2, 2) asks for; 1 where it is zero."""
+    larger = larger_eigenvalue(metric)
+    smaller = metric[:, 0, 0] + metric[:, 1, 1] - larger
+    ratio = np.divide(larger, smaller, out=np.ones_like(larger), where=smaller > 1e-14 * larger)
+    return np.asarray(np.sqrt(np.maximum(ratio, 1.0)))
 
 
-def stretch_statistics(surface: Surface, tensors: PointTensors, embedded: EmbeddedPoints) -> StretchStatistics:
-    """Compare the stretch of an embedding (V, d) with the one that metric tensors (V, 3, 3) ask for."""
-    asked, achieved = asked_stretch(surface, tensors), achieved_stretch(surface, embedded)
-    weight = surface.face_areas / max(surface.area, np.finfo(np.float64).tiny)
+def stretch_statistics(gradient: FaceGradient, metric: FaceTensors, embedded: EmbeddedPoints) -> StretchStatistics:
+    """Compare the stretch of an embedding (V, d) with the one that a metric on the faces (F, 2, 2) asks for."""
+    asked, achieved = asked_stretch(metric), achieved_stretch(gradient, embedded)
+    weight = gradient.areas / max(float(gradient.areas.sum()), np.finfo(np.float64).tiny)
     low, median, high = _quantiles(achieved / asked, weight, (0.05, 0.5, 0.95))
     return StretchStatistics(
         asked_mean=float(weight @ asked),
@@ -115,13 +117,6 @@ def stretch_statistics(surface: Surface, tensors: PointTensors, embedded: Embedd
         median=median,
         high=high,
     )
-
-
-def _stretch(tensors: npt.NDArray[np.float64]) -> FaceScalars:
-    larger = larger_eigenvalue(tensors)
-    smaller = tensors[:, 0, 0] + tensors[:, 1, 1] - larger
-    ratio = np.divide(larger, smaller, out=np.ones_like(larger), where=smaller > 1e-14 * larger)
-    return np.asarray(np.sqrt(np.maximum(ratio, 1.0)))
 
 
 def _quantiles(

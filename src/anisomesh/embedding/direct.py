@@ -3,21 +3,18 @@
 from __future__ import annotations
 
 import numpy as np
-import numpy.typing as npt
 
 from anisomesh._arrays import EmbeddedPoints, PointScalars, PointTensors
+from anisomesh._kernels.local_step import local_step
 from anisomesh.embedding.base import Embedding, EmbeddingStatus, stretch_statistics
 from anisomesh.embedding.gradient import FaceGradient, FaceTensors, eigen_2x2, face_gradient, face_tensors
 from anisomesh.embedding.poisson import poisson_solver
-from anisomesh.embedding.polar import polar_factors
 from anisomesh.errors import OptionError
 from anisomesh.surface.geometry import sums_at_points
 from anisomesh.surface.mesh import Surface
 
 _POSITION_SHARE = 0.01
 _INVARIANT_SHARE = 0.2
-
-Maps = npt.NDArray[np.float64]
 
 
 def embed(
@@ -75,7 +72,8 @@ def embed(
             f"max_iterations is {max_iterations} and tolerance {tolerance}; expected at least 1 step and 0 or more"
         )
     gradient = face_gradient(surface)
-    scale, root = _split(face_tensors(surface, tensors, gradient.frames), gradient)
+    metric = face_tensors(surface, tensors, gradient.frames)
+    scale, root = _split(metric, gradient)
     if not root.any():
         extra, residual, iterations = np.zeros((surface.n_points, extra_dimensions)), 0.0, 0
         status = EmbeddingStatus.EXACT
@@ -91,7 +89,7 @@ def embed(
         residual=residual,
         iterations=iterations,
         status=status,
-        stretch=stretch_statistics(surface, tensors, points),
+        stretch=stretch_statistics(gradient, metric, points),
     )
 
 
@@ -146,24 +144,15 @@ def _local_global(
     tolerance: float,
 ) -> tuple[EmbeddedPoints, float, int]:
     """Return the extra coordinates (V, k), the relative residual and the number of global solves."""
-    fallback = np.zeros((surface.n_faces, 2, start.shape[1]))
-    fallback[:, :, :3] = gradient.frames
     integrate = poisson_solver(surface, gradient)
     norm = float(np.einsum("f,fij,fij->", gradient.areas, root, root))
+    target = np.empty((surface.n_faces, 2, start.shape[1]))
     extra, residual = start, np.inf
     for iteration in range(max_iterations + 1):
-        jacobian = (gradient.operator @ extra).reshape(surface.n_faces, 2, -1)
-        target = _product(root, polar_factors(_product(root, jacobian), fallback))
-        difference = jacobian - target
+        jacobian = (gradient.operator @ extra).reshape(target.shape)
         previous = residual
-        residual = float(np.sqrt(gradient.areas @ np.einsum("fik,fik->f", difference, difference) / norm))
+        residual = float(np.sqrt(local_step(jacobian, root, gradient.frames, gradient.areas, target) / norm))
         if iteration == max_iterations or (iteration > 1 and residual > (1.0 - tolerance) * previous):
             break
         extra = integrate(target)
     return extra, residual, iteration
-
-
-def _product(root: FaceTensors, maps: Maps) -> Maps:
-    """Return the maps (F, 2, k) after the symmetric tensors (F, 2, 2)."""
-    rows = [root[:, i, :1] * maps[:, 0] + root[:, i, 1:] * maps[:, 1] for i in range(2)]
-    return np.stack(rows, axis=1)

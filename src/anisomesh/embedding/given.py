@@ -6,21 +6,22 @@ import numpy as np
 
 from anisomesh._arrays import EmbeddedPoints, PointTensors
 from anisomesh.embedding.base import Embedding, EmbeddingStatus, stretch_statistics
-from anisomesh.embedding.gradient import face_gradient
+from anisomesh.embedding.gradient import face_gradient, face_tensors
 from anisomesh.surface.geometry import sums_at_points
 from anisomesh.surface.mesh import Surface
 
 
 def given_embedding(surface: Surface, extra: EmbeddedPoints) -> Embedding:
     """Return the embedding [xyz, extra] of a surface, from extra coordinates (V, k)."""
-    points = np.concatenate([surface.points, extra], axis=1)
+    points, gradient = np.concatenate([surface.points, extra], axis=1), face_gradient(surface)
+    metric = face_tensors(surface, pulled_back_metric(surface, extra), gradient.frames)
     return Embedding(
         points=points,
         scale=1.0,
         residual=0.0,
         iterations=0,
         status=EmbeddingStatus.GIVEN,
-        stretch=stretch_statistics(surface, pulled_back_metric(surface, extra), points),
+        stretch=stretch_statistics(gradient, metric, points),
     )
 
 

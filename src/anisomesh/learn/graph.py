@@ -7,7 +7,8 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 import numpy.typing as npt
-from scipy.sparse import coo_array
+
+from anisomesh._kernels.pyramid import TAKEN, independent_set
 
 if TYPE_CHECKING:
     from torch import Tensor
@@ -128,22 +129,10 @@ def _independent(
 ) -> tuple[npt.NDArray[np.int64], npt.NDArray[np.int64]]:
     """Return a maximal independent set (n,), and which of its nodes, by number in it, each node belongs to (V,).
 
-    In rounds, every node left whose priority is the largest among those of its neighbours left is taken, and its
-    neighbours are out. Of equal priorities the lower number goes first.
+    The nodes are taken by falling priority, unless a neighbour was; others belong to the neighbour of largest priority
+    in the set. Of equal priorities the lower number goes first.
     """
     n = graph.n_nodes
-    rank = np.empty(n, dtype=np.int64)
-    rank[np.lexsort((-np.arange(n), priority))] = np.arange(1, n + 1)
-    link = coo_array((np.ones(len(graph.neighbour)), (graph.node, graph.neighbour)), shape=(n, n)).tocsr()
-    left, taken = np.ones(n, dtype=bool), np.zeros(n, dtype=bool)
-    while left.any():
-        around = link.multiply(np.where(left, rank, 0)[None, :]).tocsr().max(axis=1).toarray().ravel()
-        new = left & (rank > around)
-        taken |= new
-        left &= ~(new | (link @ new.astype(np.float64) > 0))
-    best = link.multiply(np.where(taken, rank, 0)[None, :]).tocsr().max(axis=1).toarray().ravel()
-    owner_rank = np.where(taken, rank, best).astype(np.int64)
-    members = np.flatnonzero(taken)
-    by_rank = np.zeros(n + 1, dtype=np.int64)
-    by_rank[rank[members]] = np.arange(len(members))
-    return members, by_rank[owner_rank]
+    state, owner = np.zeros(n, dtype=np.int8), np.zeros(n, dtype=np.int64)
+    independent_set(graph.first, graph.neighbour, np.argsort(-priority, kind="stable"), state, owner)
+    return np.flatnonzero(state == TAKEN), owner

@@ -8,8 +8,17 @@ import torch
 from torch import Tensor
 from torch.autograd.function import once_differentiable
 
-from anisomesh._kernels.messages import largest_messages, mean_back, mean_messages, spread_back
+from anisomesh._kernels.messages import (
+    distances_back,
+    largest_messages,
+    mean_back,
+    mean_messages,
+    spread_back,
+    value_distances,
+)
 from anisomesh.learn.graph import Graph
+
+_SOFTENING = 1e-12  # under the root of a distance, so that it has a derivative where values are equal
 
 
 class _LargestMessages(torch.autograd.Function):
@@ -72,6 +81,56 @@ def largest_by_scatter(sent: Tensor, weight: Tensor, graph: Graph, along: Tensor
     index = edges.node[:, None].expand_as(messages)
     largest = start.scatter_reduce(0, index, messages, "amax", include_self=True)
     return torch.where(torch.isinf(largest), torch.zeros_like(largest), largest)
+
+
+class _Distances(torch.autograd.Function):
+    """See :func:`distance_of_neighbours`; on the CPU one pass over the edges, with no table of differences."""
+
+    @staticmethod
+    def forward(context: Any, values: Tensor, graph: Graph) -> Tensor:
+        values = values.detach().contiguous()
+        distance = torch.empty(len(graph.neighbour), dtype=torch.float32)
+        value_distances(graph.first, graph.neighbour, values.numpy(), _SOFTENING, distance.numpy())
+        context.graph = graph
+        context.save_for_backward(values, distance)
+        return distance[:, None]
+
+    @staticmethod
+    @once_differentiable
+    def backward(context: Any, gradient: Tensor) -> tuple[Tensor, None]:
+        values, distance = context.saved_tensors
+        to_values = torch.zeros_like(values)
+        tables = (values, distance, gradient[:, 0].contiguous(), to_values)
+        distances_back(context.graph.first, context.graph.neighbour, *(table.numpy() for table in tables))
+        return to_values, None
+
+
+def distance_of_neighbours(values: Tensor, graph: Graph) -> Tensor:
+    """Return how far apart the values of the two ends of each edge are.
+
+    Parameters
+    ----------
+    values
+        Of the nodes (V, C), float32.
+    graph
+        The nodes and their edges.
+
+    Returns
+    -------
+    Tensor
+        (E, 1), with 1e-12 under the root.
+    """
+    if values.device.type == "cpu":
+        distance: Tensor = _Distances.apply(values, graph)  # type: ignore[no-untyped-call]
+        return distance
+    return distance_by_gather(values, graph)
+
+
+def distance_by_gather(values: Tensor, graph: Graph) -> Tensor:
+    """Return the same by plain operations of torch, on any device."""
+    edges = graph.edges_on(values.device)
+    way = values[edges.neighbour] - values[edges.node]
+    return torch.sqrt((way * way).sum(dim=1, keepdim=True) + _SOFTENING)
 
 
 class _MeanMessages(torch.autograd.Function):

@@ -8,7 +8,8 @@ from typing import NamedTuple
 import torch
 from torch import Tensor, nn
 
-from anisomesh.learn.graph import Graph
+from anisomesh.errors import OptionError
+from anisomesh.learn.graph import Edges, Graph
 from anisomesh.learn.messages import mean_of_neighbours
 from anisomesh.learn.pyramid import N_EDGE, N_NODE, N_NORMALS, Pyramid, Scale
 
@@ -16,6 +17,7 @@ _EPSILON = 1e-5
 _INPUT_SCALE = 0.3  # brings what is seen to about 1; a norm over the mesh would hide how large curvatures are
 _OFFSET_SCALE = 0.1  # offsets are small at first
 _SLOPE = 0.1
+_AT_ONCE = 8_192  # edges
 _LINES, _ROUNDS = 4, 2  # lines at a node inside a head, and times that they are mixed with those of neighbours
 
 
@@ -39,6 +41,13 @@ class NetworkOptions:
     scales: int = 5
     blocks: int = 2
     heads: int = 3
+
+    def __post_init__(self) -> None:
+        for name in ("channels", "scales", "blocks", "heads"):
+            if getattr(self, name) < 1:
+                raise OptionError(f"[network] {name} = {getattr(self, name)}; expected at least 1")
+        if self.heads > self.scales:
+            raise OptionError(f"[network] heads = {self.heads}; expected no more than scales, {self.scales}")
 
 
 class Norm(nn.Module):
@@ -128,10 +137,9 @@ class Head(nn.Module):
         """Return lines (V, 2) and vectors (V, 3) from (V, C)."""
         edges, device = scale.graph.edges_on(x.device), x.device
         share = 1.0 / torch.bincount(edges.node, minlength=len(x)).clamp(min=1)
-        inner = self.start(x)[edges.node] + self.end(x)[edges.neighbour] + self.along(edges.along)
-        of_edges = self.of_edges(nn.functional.leaky_relu(inner, _SLOPE)) * share[edges.node, None]
-        direct, dual, *mixing, vector = of_edges.split([_LINES] * (2 + _ROUNDS) + [1], dim=1)
-        fitted, last, *keeping = self.of_nodes(x).split(_LINES, dim=1)
+        of_edges = self._of_edges(x, edges) * share[edges.node, None]
+        direct, dual, *mixing, vector = torch.split(of_edges, [_LINES] * (2 + _ROUNDS) + [1], dim=1)
+        fitted, last, *keeping = torch.split(self.of_nodes(x), _LINES, dim=1)
         turns, duals, ties, ways, fit = (
             torch.from_numpy(values).to(device)
             for values in (scale.turns, scale.duals, scale.ties, scale.ways, scale.fit)
@@ -143,6 +151,15 @@ class Head(nn.Module):
             lines = (1.0 + keep[:, :, None]) * lines + _at_nodes(mix[:, :, None] * carried, edges.node, len(x))
         vectors = _at_nodes(vector * ways, edges.node, len(x))
         return (last[:, :, None] * lines).sum(dim=1), vectors
+
+    def _of_edges(self, x: Tensor, edges: Edges) -> Tensor:
+        """Return the factors of the edges (E, ...), some edges at a time: what is between is many times larger."""
+        start, end = self.start(x), self.end(x)
+        parts = []
+        for node, neighbour, along in zip(*(torch.split(values, _AT_ONCE) for values in edges), strict=True):
+            inner = start[node] + end[neighbour] + self.along(along)
+            parts.append(self.of_edges(nn.functional.leaky_relu(inner, _SLOPE)))
+        return torch.cat(parts)
 
 
 class Prediction(NamedTuple):

@@ -11,13 +11,15 @@ from scipy.sparse import csr_array
 from scipy.spatial import cKDTree
 from torch import Tensor, nn
 
+from anisomesh.errors import OptionError
 from anisomesh.learn.graph import Graph, graph_of
-from anisomesh.learn.messages import largest_of_neighbours
+from anisomesh.learn.messages import distance_of_neighbours, largest_of_neighbours
 from anisomesh.learn.network import Norm
 from anisomesh.surface.mesh import Surface
 
 INPUTS, OUTPUTS = 6, 5
 _SLOPE = 0.1
+_SMALL = 0.01  # extra coordinates are small at first
 _NEAREST = 3  # nodes that were kept, from which those that were not take their values
 
 
@@ -38,6 +40,13 @@ class PaperOptions:
     channels: int = 64
     levels: int = 5
     ratio: float = 0.5
+
+    def __post_init__(self) -> None:
+        if self.channels < 1 or self.levels < 0 or not 0.0 < self.ratio <= 1.0:
+            raise OptionError(
+                f"[paper] channels = {self.channels}, levels = {self.levels}, ratio = {self.ratio}; "
+                "expected at least 1 channel, no negative number of levels, and a share of the nodes above 0"
+            )
 
 
 @dataclass(frozen=True, eq=False)
@@ -72,9 +81,7 @@ class PaperConvolution(nn.Module):
 
     def forward(self, x: Tensor, graph: Graph) -> Tensor:
         """Return (V, C) from (V, inputs)."""
-        edges = graph.edges_on(x.device)
-        way = x[edges.neighbour] - x[edges.node]
-        away = torch.sqrt((way * way).sum(dim=1, keepdim=True) + 1e-12)
+        away = distance_of_neighbours(x, graph)
         largest = largest_of_neighbours(self.sent(x), self.away, graph, away) - self.own(x)
         mixed: Tensor = self.out(torch.cat([x, largest], dim=1))
         return mixed
@@ -134,6 +141,8 @@ class PaperNetwork(nn.Module):
         self.bottom = PaperBlock(channels, channels)
         self.up = nn.ModuleList(PaperBlock(channels, channels) for _ in range(options.levels))
         self.out = nn.Linear(channels, OUTPUTS)
+        with torch.no_grad():  # coordinates of size 1 would be edges a hundred times too long
+            self.out.weight.mul_(_SMALL)
 
     def forward(self, seen: Seen) -> Tensor:
         """Return (N, 5)."""

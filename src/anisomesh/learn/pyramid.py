@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
-import math
 from dataclasses import dataclass
 
 import numpy as np
 import numpy.typing as npt
 
+from anisomesh._kernels.pyramid import carry_to_points, edge_geometry, edge_invariants, fit_directions, spread_at_nodes
 from anisomesh.learn.graph import Graph, Level, graph_of, hierarchy
 from anisomesh.metric.tangent import tangent_frames
 from anisomesh.surface.geometry import sums_at_points, unit
@@ -122,7 +122,8 @@ def pyramid(surface: Surface, n_scales: int) -> Pyramid:
     ]
     frames = tangent_frames(places[0].normals)
     scales = [
-        _scale(level, _heights(levels, places, k), places[k], ancestors[k], frames) for k, level in enumerate(levels)
+        _scale(level, _heights(levels, places, k), places[k], ancestors[k], places[0], frames)
+        for k, level in enumerate(levels)
     ]
     length = np.exp(scales[0].nodes[:, _LENGTH].astype(np.float64))
     near = [min(k, len(levels) - 1) for k in range(N_NORMALS)]
@@ -165,88 +166,39 @@ def _some_normals(sums: Doubles) -> Doubles:
     return normals
 
 
-def _scale(level: Level, heights: Doubles, place: _Places, ancestor: Ints, fine_frames: Doubles) -> Scale:
+def _scale(level: Level, heights: Doubles, place: _Places, ancestor: Ints, points: _Places, frames: Doubles) -> Scale:
     """Return what is known of a graph whose nodes are at these places and heights (V, 2)."""
-    graph, positions, normals = level.graph, place.positions, place.normals
-    frames = tangent_frames(normals)
-    i, j = graph.node, graph.neighbour
-    way = positions[j] - positions[i]
-    square = np.maximum((way**2).sum(axis=1), 1e-30)
-    length = np.sqrt(square)
-    bend = [sign * 2.0 * np.einsum("ex,ex->e", normals[k], way) / square for k, sign in ((i, -1), (j, 1))]
-    turn = np.arcsinh(np.linalg.norm(normals[j] - normals[i], axis=1) / length)
-    turns, turns_there = (_double_angle(np.einsum("ekx,ex->ek", frames[k], way)) for k in (i, j))
-    duals = _dual_directions(graph, turns)
-    fit = _node_sums(graph, duals * bend[0][:, None])  # mean curvature, and half the difference as a line
+    first, neighbour = level.graph.first, level.graph.neighbour
+    n, n_edges = level.graph.n_nodes, len(neighbour)
+    own_frames = tangent_frames(place.normals)
+    values, turns = np.empty((n_edges, 4)), np.empty((n_edges, 2, 2))
+    ways, ties = np.empty((n_edges, 3), dtype=np.float32), np.empty((n_edges, 2), dtype=np.float32)
+    edge_geometry(first, neighbour, place.positions, place.normals, own_frames, values, turns, ways, ties)
+    duals, fit, imbalance = np.empty((n_edges, 3)), np.empty((n, 3)), np.empty(n)
+    fit_directions(first, turns, values[:, 1], _HELD, duals, fit, imbalance)
     half = np.linalg.norm(fit[:, 1:], axis=1)
     line = fit[:, 1:] / (half + _ROUND_SHARE * np.abs(fit[:, 0]) + _FLAT)[:, None]  # fades where there is no direction
-    across = [np.einsum("ek,ek->e", line[k], seen) for k, seen in ((i, turns), (j, turns_there))]
-    count = np.maximum(np.diff(graph.first), 1)
-    mean_length = _node_sums(graph, length) / count
-    small_bend = [np.arcsinh(values) for values in bend]
-    along = np.stack([np.log(length / mean_length[i]), *small_bend, turn, *across, duals[:, 0] * count[i]], axis=1)
+    values[:, 1:] = np.arcsinh(values[:, 1:])
+    spread, along = np.empty((n, 4, 4)), np.empty((n_edges, N_EDGE), dtype=np.float32)
+    spread_at_nodes(first, values, spread)
+    mean_length = spread[:, 0, 2]
+    edge_invariants(first, neighbour, values, turns, line, duals, mean_length, along)
     mean_length = np.maximum(mean_length, 1e-6)
-    columns = [*_spread(graph, small_bend[0]), *_spread(graph, turn)[::2], np.log(mean_length), place.agreement]
+    columns = [*spread[:, 1].T, *spread[:, 3, ::2].T, np.log(mean_length), place.agreement]
     columns += [*(_HEIGHT * heights / mean_length[:, None]).T, np.arcsinh(fit[:, 0]), np.arcsinh(half)]
-    columns += [_TURNS * np.linalg.norm(_node_sums(graph, turns), axis=1) / count]
+    columns += [_TURNS * imbalance]
+    carry = np.empty((len(ancestor), 2), dtype=np.float32)
+    carry_to_points(ancestor, own_frames, place.normals, frames, points.normals, carry)
+    count = np.diff(first)[level.graph.node]
     return Scale(
-        graph=Graph(first=graph.first, neighbour=graph.neighbour, along=along.astype(np.float32)),
+        graph=Graph(first=first, neighbour=neighbour, along=along),
         nodes=np.stack(columns, axis=1).astype(np.float32),
         fit=((np.arcsinh(half) / np.maximum(half, 1e-30))[:, None] * fit[:, 1:]).astype(np.float32),
-        ways=way.astype(np.float32),
-        turns=turns.astype(np.float32),
-        duals=(duals[:, 1:] * count[i, None]).astype(np.float32),
-        ties=_carry(frames[j], frames[i]).astype(np.float32),
+        ways=ways,
+        turns=turns[:, 0].astype(np.float32),
+        duals=(duals[:, 1:] * count[:, None]).astype(np.float32),
+        ties=ties,
         cluster=level.cluster,
         ancestor=ancestor,
-        carry=_carry(frames[ancestor], fine_frames).astype(np.float32),
+        carry=carry,
     )
-
-
-def _dual_directions(graph: Graph, turns: Doubles) -> Doubles:
-    """Return weights (E, 3) whose sum with values of the edges of a node is their fit a + b cos 2t + c sin 2t.
-
-    The least squares fit over the directions t of the edges (E, 2), held back a little where these do not decide it.
-    """
-    basis = np.concatenate([np.ones((len(turns), 1)), turns], axis=1)
-    products = _node_sums(graph, (basis[:, :, None] * basis[:, None, :]).reshape(-1, 9)).reshape(-1, 3, 3)
-    count = np.maximum(np.diff(graph.first), 1)
-    inverse = np.linalg.inv(products + (_HELD * count)[:, None, None] * np.eye(3))
-    return np.asarray(np.einsum("eab,eb->ea", inverse[graph.node], basis))
-
-
-def _node_sums(graph: Graph, values: Doubles) -> Doubles:
-    """Return the sums of values (E,) or (E, K) over the edges of each node."""
-    flat = values.reshape(len(values), math.prod(values.shape[1:]))
-    sums = np.stack([np.bincount(graph.node, column, minlength=graph.n_nodes) for column in flat.T], axis=1)
-    return np.asarray(sums.reshape(graph.n_nodes, *values.shape[1:]), dtype=np.float64)
-
-
-def _spread(graph: Graph, values: Doubles) -> tuple[Doubles, Doubles, Doubles, Doubles]:
-    """Return largest, smallest, mean and deviation (V,) of values (E,) over the edges of each node, 0 without any."""
-    count = np.maximum(np.diff(graph.first), 1)
-    mean = _node_sums(graph, values) / count
-    deviation = np.sqrt(np.maximum(_node_sums(graph, values**2) / count - mean**2, 0.0))
-    largest, smallest = np.zeros((2, graph.n_nodes))
-    some = np.flatnonzero(np.diff(graph.first))
-    if len(some):
-        begin = graph.first[some]
-        largest[some], smallest[some] = np.maximum.reduceat(values, begin), np.minimum.reduceat(values, begin)
-    return largest, smallest, mean, deviation
-
-
-def _double_angle(plane: Doubles) -> Doubles:
-    """Return cosine and sine of twice the angle of vectors (n, 2), zeros for those without length."""
-    x, y = plane.T
-    square = np.maximum(x * x + y * y, 1e-30)
-    return np.stack([(x * x - y * y) / square, 2.0 * x * y / square], axis=1)
-
-
-def _carry(source: Doubles, target: Doubles) -> Doubles:
-    """Return the rotation from frames to others (n, 2, 3), by the smallest rotation of one normal to the other."""
-    from_normal, to_normal = (np.cross(frame[:, 0], frame[:, 1]) for frame in (source, target))
-    cosine = np.einsum("nx,nx->n", from_normal, to_normal)
-    carried = source[:, 0]
-    lift = np.einsum("nx,nx->n", carried, to_normal) / np.maximum(1.0 + cosine, 1e-9)
-    carried = carried - lift[:, None] * (from_normal + to_normal)
-    return _double_angle(np.einsum("nx,nkx->nk", carried, target))
