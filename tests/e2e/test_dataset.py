@@ -15,7 +15,7 @@ from anisomesh.dataset.build import build, sources_of
 from anisomesh.dataset.make import Recipe
 from anisomesh.errors import MeshFileError, OptionError
 from anisomesh.learn.items import load_item
-from anisomesh.learn.manifest import MANIFEST, read_manifest
+from anisomesh.learn.manifest import MANIFEST, files_of, read_manifest
 from anisomesh.surface.shapes import ellipsoid, sphere, torus
 
 RECIPE = Recipe(target=200, variants=("decimated",))
@@ -94,6 +94,27 @@ def test_a_build_that_was_killed_goes_on(folder, tmp_path):
     assert len(rows) == 5
     assert set(made) == {row["name"] for row in rows} - {row["name"] for row in before}
     assert len(read_manifest(out)) == 5
+
+
+def test_the_list_has_the_sources_asked_for_and_their_present_families(folder, tmp_path):
+    out, recipe = tmp_path / "out", Recipe(target=200, variants=())
+    build(sources_of(folder, 2), out, recipe, workers=2)
+    (folder / "odd.ply").mkdir()  # no mesh, in spite of its name
+    files = [path.relative_to(folder).as_posix() for path in sorted(folder.rglob("*.ply")) if path.is_file()]
+    list_ = "".join(f"{file},{'one' if 'egg' in file else file}\n" for file in files)
+    (folder / "manifest.csv").write_text("\ufefffile,family\n" + list_, encoding="utf-8")
+    made = []
+    rows = build(sources_of(folder, 1), out, recipe, validation=0.6, workers=2, on_row=lambda row, *_: made.append(row))
+    (folder / "odd.ply").rmdir()
+    assert made == []
+    assert read_manifest(out) == rows
+    assert "blobs-0001" not in {row["name"] for row in rows}
+    assert {row["family"] for row in rows if "egg" in row["name"]} == {"one"}
+    splits = {row["family"]: row["split"] for row in rows}
+    assert set(splits.values()) == {"training", "validation"}
+    assert len(files_of(out).validation) == sum(
+        len(row["items"]) for row in rows if row["split"] == "validation" and row["status"] == "kept"
+    )
 
 
 def test_the_split_depends_on_the_family_alone(folder):

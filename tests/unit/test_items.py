@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+import trimesh
 
 from anisomesh.dataset.implicit import Blobs
 from anisomesh.dataset.make import Recipe, UnsuitableError, evened, items_of_blobs, items_of_mesh
@@ -10,8 +11,7 @@ from anisomesh.evaluation.distance import surface_distance
 from anisomesh.learn.items import Item, load_item, save_item
 from anisomesh.metric.tensor import validate_metric
 from anisomesh.surface.geometry import thickness
-from anisomesh.surface.mesh import Surface
-from anisomesh.surface.shapes import box, ellipsoid, sphere
+from anisomesh.surface.shapes import box, ellipsoid, sphere, torus
 
 RECIPE = Recipe(target=500)
 
@@ -136,9 +136,17 @@ def test_recipes_that_cannot_be_are_refused(wrong):
         Recipe(**wrong)
 
 
-def test_evening_with_a_package_that_is_not_there_names_it():
-    try:
-        import pytetwild  # noqa: F401
-    except ImportError:
-        with pytest.raises(OptionError, match="pip install pytetwild"):
-            evened(Surface(sphere(1).points, sphere(1).faces), Recipe(target=600, evening="tetwild"))
+@pytest.mark.parametrize("surface", [box(n=3), torus()])
+def test_evening_with_tetwild_keeps_the_shape_and_which_side_is_out(surface):
+    pytest.importorskip("pytetwild")
+    even = evened(surface, Recipe(target=600, evening="tetwild"))
+    assert even.n_points == 600
+    assert even.area == pytest.approx(surface.area, rel=0.02)
+    volumes = [trimesh.Trimesh(each.points, each.faces, process=False).volume for each in (even, surface)]
+    assert volumes[0] == pytest.approx(volumes[1], rel=0.05)  # negative if turned inside out
+
+
+def test_evening_with_a_package_that_is_not_there_names_it(monkeypatch):
+    monkeypatch.setattr("importlib.util.find_spec", lambda name: None)
+    with pytest.raises(OptionError, match="pip install pytetwild"):
+        evened(sphere(1), Recipe(target=600, evening="tetwild"))

@@ -13,12 +13,12 @@ from pathlib import Path
 import numpy as np
 
 from anisomesh.dataset.implicit import Blobs
-from anisomesh.dataset.make import Made, Recipe, UnsuitableError, items_of_blobs, items_of_mesh
+from anisomesh.dataset.make import Made, Recipe, UnsuitableError, items_of_blobs, items_of_mesh, require_packages
 from anisomesh.errors import AnisomeshError, OptionError
 from anisomesh.isolation import isolated
 from anisomesh.learn.items import save_item
 from anisomesh.learn.manifest import MANIFEST, Row, read_manifest
-from anisomesh.surface.files import append_line, drop_cut_line
+from anisomesh.surface.files import append_line, atomic_path, drop_cut_line
 from anisomesh.surface.io import FORMATS, load
 
 _VERSION = 1  # of the items; another one makes a build start anew
@@ -73,7 +73,7 @@ def sources_of(folder: Path | None, n_blobs: int) -> list[Source]:
         if not folder.is_dir():
             raise OptionError(f"{folder} is no folder of meshes")
         families = _families(folder)
-        for path in sorted(path for path in folder.rglob("*") if path.suffix.lower() in FORMATS):
+        for path in sorted(p for p in folder.rglob("*") if p.suffix.lower() in FORMATS and p.is_file()):
             name = "-".join(path.relative_to(folder).with_suffix("").parts)
             found.append(Source(name=name, family=families.get(path.resolve(), name), path=path, seed=_number(name)))
     for number in range(n_blobs):
@@ -106,7 +106,8 @@ def build(
     sources
         What to make items of.
     out
-        Folder of the items and of ``manifest.jsonl``, one row a source; it is made if it is not there.
+        Folder of the items and of ``manifest.jsonl``, one row a source; it is made if it is not there. Rows of other
+        sources are taken out of the list.
     recipe
         How items are made.
     validation
@@ -122,19 +123,40 @@ def build(
         With ``name, family, split, fingerprint``; ``status`` ``kept`` with the ``items``, ``dropped`` with the
         ``reason`` where a shape is unsuitable, ``failed`` with the ``reason`` where it cannot be read or mended, or
         ended the process. None of these is tried again unless its file or the recipe changes.
+
+    Raises
+    ------
+    OptionError
+        If an option is out of range, or the package is missing that makes meshes even.
+    MeshFileError
+        If the list of an earlier build is damaged, or nothing can be written.
+
+    Notes
+    -----
+    Processes are spawned, so a script that calls this needs ``if __name__ == "__main__"``.
     """
     if not 0.0 <= validation < 1.0 or workers < 1:
         raise OptionError(f"validation = {validation}, workers = {workers}; expected a share below 1, and 1 or more")
+    require_packages(recipe)
     out.mkdir(parents=True, exist_ok=True)
-    drop_cut_line(out / MANIFEST)
-    known = {row["name"]: row for row in read_manifest(out)}
     starts = {source.name: _start(source, recipe, validation) for source in sources}
+    before = {row["name"]: row for row in read_manifest(out)}
+    places = {name: {key: start[key] for key in ("family", "split")} for name, start in starts.items()}
+    known = {name: {**row, **places[name]} for name, row in before.items() if name in places}
+    if known != before:
+        with atomic_path(out / MANIFEST) as temporary:
+            Path(temporary).write_text("".join(map(_line, known.values())), encoding="utf-8")
+    drop_cut_line(out / MANIFEST)
     jobs = [source for source in sources if not _is_done(known.get(source.name), starts[source.name], out)]
     for number, (source, row) in enumerate(_in_parallel(jobs, out, recipe, workers), 1):
         known[source.name] = {**starts[source.name], **row}
-        append_line(out / MANIFEST, json.dumps(known[source.name], allow_nan=False))
+        append_line(out / MANIFEST, _line(known[source.name]).rstrip())
         on_row(known[source.name], number, len(jobs))
-    return [{**known[name], "split": start["split"]} for name, start in starts.items()]
+    return [known[name] for name in starts]
+
+
+def _line(row: Row) -> str:
+    return json.dumps(row, allow_nan=False) + "\n"
 
 
 def _start(source: Source, recipe: Recipe, validation: float) -> Row:
@@ -202,7 +224,7 @@ def _families(folder: Path) -> dict[Path, str]:
     for base in (folder, folder.parent):
         path = base / "manifest.csv"
         if path.is_file():
-            with path.open(newline="", encoding="utf-8") as file:
+            with path.open(newline="", encoding="utf-8-sig") as file:
                 rows = list(csv.DictReader(file))
             if rows and {"file", "family"} <= set(rows[0]):
                 return {(base / row["file"]).resolve(): row["family"] for row in rows}

@@ -2,8 +2,11 @@
 
 from __future__ import annotations
 
+import importlib.util
 from collections.abc import Callable
+from contextlib import chdir
 from dataclasses import dataclass, field
+from tempfile import TemporaryDirectory
 from typing import Any, Literal
 
 import numpy as np
@@ -71,6 +74,12 @@ class Recipe:
                 raise OptionError(f"variant {name!r} is unknown; expected some of {', '.join(VARIANTS)}")
         if self.evening not in ("cvt", "tetwild"):
             raise OptionError(f"evening = {self.evening!r}; expected 'cvt' or 'tetwild'")
+
+
+def require_packages(recipe: Recipe) -> None:
+    """Raise ``OptionError`` if a package is missing that a recipe needs."""
+    if recipe.evening == "tetwild" and not importlib.util.find_spec("pytetwild"):
+        raise OptionError("evening with tetwild needs the package pytetwild: pip install pytetwild")
 
 
 class UnsuitableError(AnisomeshError):
@@ -199,17 +208,17 @@ def _settling(blobs: Blobs, frame: Frame) -> Callable[[Points], Points]:
 
 
 def _tetwild(surface: Surface) -> Surface:
-    """Return the boundary of the tetrahedra that pytetwild makes of a surface."""
-    try:
-        import pytetwild
-    except ImportError as error:
-        raise OptionError("evening with tetwild needs the package pytetwild: pip install pytetwild") from error
-    points, cells = pytetwild.tetrahedralize(surface.points, surface.faces, optimize=False, quiet=True)[:2]
-    sides = np.sort(
-        np.concatenate([cells[:, [1, 2, 3]], cells[:, [0, 3, 2]], cells[:, [0, 1, 3]], cells[:, [0, 2, 1]]])
-    )
+    """Return the boundary, seen from outside, of the tetrahedra that pytetwild makes of a surface."""
+    require_packages(Recipe(evening="tetwild"))
+    import pytetwild
+
+    arrays = np.array(surface.points), np.array(surface.faces, dtype=np.int32)  # it takes no read-only ones
+    with TemporaryDirectory() as folder, chdir(folder):  # it leaves a file in the current one
+        points, cells = pytetwild.tetrahedralize(*arrays, optimize=False, quiet=True)
+    inverted = np.linalg.det(points[cells[:, 1:]] - points[cells[:, :1]]) < 0.0
+    cells[inverted] = cells[inverted][:, [1, 0, 2, 3]]
     faces = np.concatenate([cells[:, [1, 2, 3]], cells[:, [0, 3, 2]], cells[:, [0, 1, 3]], cells[:, [0, 2, 1]]])
-    _, first, count = np.unique(sides, axis=0, return_index=True, return_counts=True)
+    _, first, count = np.unique(np.sort(faces, axis=1), axis=0, return_index=True, return_counts=True)
     outer = faces[first[count == 1]]
     used, outer = np.unique(outer, return_inverse=True)
-    return prepare(Surface(np.asarray(points)[used], outer.reshape(-1, 3))).surface
+    return prepare(Surface(points[used], outer.reshape(-1, 3))).surface

@@ -47,7 +47,7 @@ def read_manifest(folder: Path) -> list[Row]:
 
 
 def files_of(folder: Path) -> Files:
-    """Return the items of a data set.
+    """Return the items of a data set, in the order of their names, whatever order they were made in.
 
     Raises
     ------
@@ -62,4 +62,4 @@ def files_of(folder: Path) -> Files:
     found: dict[str, list[Path]] = {"training": [], "validation": []}
     for row in rows:
         found[row["split"]] += [folder / item["file"] for item in row["items"]]
-    return Files(**found)
+    return Files(training=sorted(found["training"]), validation=sorted(found["validation"]))
