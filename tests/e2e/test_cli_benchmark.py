@@ -237,9 +237,15 @@ def test_a_suite_trains_the_networks_that_it_compares(tmp_path, run_cli):
         "ours 1: epoch 2 of 2",
         "theirs: epoch 1 of 1",
     ]
-    assert {path.parent.name for path in (tmp_path / "rows").glob("*/weights.safetensors")} == {"ours-1", "theirs"}
+    folders = [path.parent.name for path in (tmp_path / "rows").glob("*/weights.safetensors")]
+    assert sorted(name.rpartition("-")[0] for name in folders) == ["ours-1", "theirs"]
     run_suite(wanted, tmp_path / "rows.jsonl", on_row=steps.append)
     assert not steps
+    told.clear()
+    changed = suite(shapes=["ring:300"], methods=[ours, {**theirs, "training": {**paper, "rate": 1e-3}}])
+    run_suite(changed, tmp_path / "rows.jsonl", items=tmp_path / "items", on_row=steps.append, on_epoch=told.append)
+    assert [text.split(",")[0] for text in told] == ["theirs: epoch 1 of 1"]  # and not a refusal to go on
+    assert [step.row["method"] for step in steps] == ["theirs"]
     wrong = suite(methods=[{**ours, "training": {"epoch": 2}}])
     with pytest.raises(OptionError, match="did you mean 'epochs'"):
         run_suite(wrong, tmp_path / "others.jsonl", items=tmp_path / "items")

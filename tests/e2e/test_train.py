@@ -7,6 +7,7 @@ import subprocess
 import sys
 import time
 from functools import partial
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -19,15 +20,17 @@ import anisomesh  # noqa: E402
 from anisomesh.dataset.implicit import Blobs  # noqa: E402
 from anisomesh.dataset.make import Recipe, items_of_blobs  # noqa: E402
 from anisomesh.errors import OptionError  # noqa: E402
-from anisomesh.learn.checkpoint import WeightsError, load_weights  # noqa: E402
+from anisomesh.learn.checkpoint import WeightsError, load_state, load_weights, save_state  # noqa: E402
 from anisomesh.learn.config import TrainingOptions, load_training  # noqa: E402
 from anisomesh.learn.items import load_item, save_item  # noqa: E402
-from anisomesh.learn.manifest import Files  # noqa: E402
+from anisomesh.learn.manifest import Files, files_of  # noqa: E402
 from anisomesh.learn.network import NetworkOptions  # noqa: E402
 from anisomesh.learn.paper import PaperOptions  # noqa: E402
 from anisomesh.learn.predict import predict  # noqa: E402
+from anisomesh.learn.run import CHECKPOINT, EVENTS, METRICS, WEIGHTS, DivergedError  # noqa: E402
 from anisomesh.learn.shipped import weights_path  # noqa: E402
-from anisomesh.learn.train import CHECKPOINT, EVENTS, METRICS, WEIGHTS, train  # noqa: E402
+from anisomesh.learn.tasks import StretchTask  # noqa: E402
+from anisomesh.learn.train import train  # noqa: E402
 from anisomesh.pipeline import max_edge  # noqa: E402
 from anisomesh.surface.geometry import unit_frame  # noqa: E402
 from anisomesh.surface.subdivide import split_long_edges  # noqa: E402
@@ -53,7 +56,7 @@ def files(tmp_path_factory):
         for seed, split in enumerate(("training", "validation"))
     ]
     (folder / "manifest.jsonl").write_text("".join(json.dumps(row) + "\n" for row in rows))
-    return Files(training=paths[:3], validation=paths[3:])
+    return files_of(folder)
 
 
 def options_with(folder, **changes):
@@ -88,6 +91,85 @@ def test_a_run_learns_and_writes_its_files(files, tmp_path):
     assert facts["training"]["epochs"] == 12
     best = min(rows, key=lambda row: row["validation 0"] + row["validation 0.3"])
     assert facts["epoch"] == best["epoch"]
+
+
+def test_a_run_that_was_stopped_in_its_validation_goes_on(files, tmp_path, monkeypatch):
+    whole = train(options(tmp_path / "whole"), files)
+    example, seen = StretchTask.example, []
+
+    def stopping(task, item, noise, rng, *, training):
+        seen.append(training)
+        if not training and seen.count(False) == 8:
+            os.kill(os.getpid(), signal.SIGTERM)
+        return example(task, item, noise, rng, training=training)
+
+    monkeypatch.setattr(StretchTask, "example", stopping)
+    with pytest.raises(KeyboardInterrupt):
+        train(options(tmp_path / "cut"), files)
+    assert seen.count(False) == 8  # the rest of the validation waits
+    assert losses(train(options(tmp_path / "cut"), files, resume=True)) == losses(whole)
+    assert seen.count(True) == 4 * len(files.training)  # no step was made twice
+
+
+def test_a_loss_that_is_no_number_ends_the_run_and_leaves_its_checkpoint(files, tmp_path):
+    with pytest.raises(DivergedError, match="lower rate"):
+        train(options(tmp_path / "run", rate=1e30, warmup=0), files)
+    assert not (tmp_path / "run" / WEIGHTS).exists()
+
+
+def test_a_run_does_not_go_on_with_other_items_or_without_a_checkpoint(files, tmp_path):
+    with pytest.raises(OptionError, match="without --resume"):
+        train(options(tmp_path / "none"), files, resume=True)
+    train(options(tmp_path / "run", epochs=1), files)
+    others = (
+        Files(training=files.training[::-1], validation=files.validation),
+        Files(training=[*files.training, files.validation[0]], validation=files.validation[1:]),
+    )
+    for other in others:
+        with pytest.raises(WeightsError, match="other items"):
+            train(options(tmp_path / "run", epochs=1), other, resume=True)
+
+
+def test_a_run_goes_on_without_the_weights_that_it_started_from(files, tmp_path):
+    train(options(tmp_path / "first", epochs=1), files)
+    start = tmp_path / "first" / WEIGHTS
+    train(options(tmp_path / "run", epochs=1, start=str(start)), files)
+    start.unlink()
+    train(options(tmp_path / "run", epochs=1, start="elsewhere", minutes=1.0), files, resume=True)
+
+
+def test_moments_come_back_to_their_parameters_where_some_have_none(tmp_path):
+    def made():
+        network = torch.nn.ModuleList(torch.nn.Linear(2, 2) for _ in range(3))
+        return network, torch.optim.AdamW(network.parameters())
+
+    network, optimiser = made()
+    network[2](torch.ones(1, 2)).sum().backward()  # the others have no gradient
+    optimiser.step()
+    save_state(tmp_path / "state", network, optimiser, {})
+    other, restored = made()
+    load_state(tmp_path / "state", other, restored)
+    wanted = optimiser.state_dict()["state"]
+    assert restored.state_dict()["state"].keys() == wanted.keys() == {4, 5}
+    for number, values in wanted.items():
+        for name, value in values.items():
+            torch.testing.assert_close(restored.state_dict()["state"][number][name], value)
+
+
+@pytest.mark.parametrize(
+    ("kind", "sizes"),
+    [
+        (NetworkOptions, {"scales": 0}),
+        (NetworkOptions, {"channels": 0}),
+        (NetworkOptions, {"heads": 6}),
+        (PaperOptions, {"ratio": 1.5}),
+        (PaperOptions, {"levels": -1}),
+        (PaperOptions, {"channels": 0}),
+    ],
+)
+def test_sizes_that_no_network_has_are_refused(kind, sizes):
+    with pytest.raises(OptionError, match=next(iter(sizes))):
+        kind(**sizes)
 
 
 @pytest.mark.parametrize(("stop_after", "network"), [(1, NETWORK), (2, NETWORK), (3, NETWORK), (2, PAPER)])
@@ -189,13 +271,20 @@ def test_folders_of_a_configuration_are_relative_to_its_file(tmp_path):
     assert load_training(tmp_path / "a.toml").network == PAPER
 
 
-def test_shipped_configurations_are_relative_to_the_current_folder():
-    loaded = load_training("default")
-    assert (loaded.data, loaded.out) == ("items", "default")
-    network, facts = load_weights(weights_path("default"))
-    assert loaded.network == network.options
-    same = {name: facts["training"][name] for name in ("epochs", "batch", "rate", "noise", "noise_share", "seed")}
-    assert same == {name: getattr(loaded, name) for name in same}
+@pytest.mark.parametrize(("name", "network"), [("default-further", "default"), ("paper", "paper")])
+def test_shipped_configurations_are_those_of_the_shipped_networks(name, network):
+    loaded = load_training(name)
+    assert (loaded.data, loaded.out) == ("items", name)  # relative to the current folder
+    weights, facts = load_weights(weights_path(network))
+    assert loaded.network == weights.options
+    same = ("epochs", "batch", "rate", "noise", "noise_share", "seed", "loss", "laplacian", "gauge", "augment")
+    assert {key: facts["training"][key] for key in same} == {key: getattr(loaded, key) for key in same}
+
+
+def test_the_second_run_of_the_default_network_starts_from_the_first():
+    first, second = load_training("default"), load_training("default-further")
+    assert first.network == second.network
+    assert second.start == str(Path(first.out) / WEIGHTS)
 
 
 def test_the_command_trains_stops_and_resumes(files, tmp_path, run_cli):
@@ -265,7 +354,7 @@ def test_a_remesh_takes_the_metric_of_a_trained_network(files, tmp_path, run_cli
     done = run_cli(*words, "--weights", tmp_path / "in.ply")
     assert done.returncode == 1
     assert "safetensors" in done.stderr.strip().splitlines()[-1]
-    with pytest.raises(OptionError, match="takes no other"):
+    with pytest.raises(OptionError, match="and no other"):
         anisomesh.remesh(surface, n_vertices=150, embedding="neural", weights=weights, metric="uniform")
 
 

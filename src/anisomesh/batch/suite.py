@@ -149,6 +149,8 @@ def _method(suite: str, entry: dict[str, Any]) -> Method:
             f"{suite}: method {method!r} is unknown{hint(method, list(METHODS))}; expected one of {', '.join(METHODS)}"
         )
     options, training = dict(entry.get("options", {})), entry.get("training")
+    if training is not None and not isinstance(training, dict):
+        raise OptionError(f"{suite}: training = {training!r}; expected a table")
     return Method(name=str(entry.get("name", method)), method=method, options=options, training=training)
 
 

@@ -2,10 +2,13 @@
 
 from __future__ import annotations
 
+import hashlib
+import json
 from collections.abc import Callable
+from dataclasses import replace
 from pathlib import Path
 
-from anisomesh.batch.suite import Suite
+from anisomesh.batch.suite import Method, Suite
 from anisomesh.errors import OptionError
 from anisomesh.learn import require_torch
 
@@ -30,6 +33,8 @@ def trained(
     ------
     OptionError
         If there is something to train and no data set, or a training has an unknown key.
+    LearningError, WeightsError, DivergedError, MeshFileError
+        If torch is missing, a checkpoint or the data set damaged, or a training ends in no number.
     """
     methods = [method for method in suite.methods if method.training is not None]
     if not methods:
@@ -37,20 +42,30 @@ def trained(
     if items is None:
         raise OptionError(f"suite {suite.name} trains networks; name a data set with --items")
     require_torch()
-    from anisomesh.learn.config import parse_training
+    from anisomesh.learn.config import TrainingOptions, parse_training
     from anisomesh.learn.manifest import files_of
-    from anisomesh.learn.train import CHECKPOINT, WEIGHTS, train
+    from anisomesh.learn.run import CHECKPOINT, WEIGHTS
+    from anisomesh.learn.train import train
 
-    found = {}
     files = files_of(items)
-    for method in methods:
-        folder = out / "".join(letter if letter.isalnum() else "-" for letter in method.name)
-        table = {"data": str(items), "out": str(folder), **(method.training or {})}
+    runs: dict[str, TrainingOptions] = {}
+    for method in methods:  # all tables are read before the first network is trained
+        table = {"data": str(items), "out": "", **(method.training or {})}
         options = parse_training(f"{suite.name}: training of {method.name!r}", table)
+        runs[method.name] = replace(options, out=str(out / _folder(method)))
+    found = {}
+    for name, options in runs.items():
 
-        def tell(row: dict[str, object], name: str = method.name, epochs: int = options.epochs) -> None:
+        def tell(row: dict[str, object], name: str = name, epochs: int = options.epochs) -> None:
             on_epoch(f"{name}: epoch {row['epoch']} of {epochs}, loss {row['loss']:.4f}")
 
+        folder = Path(options.out)
         train(options, files, resume=(folder / CHECKPOINT).exists(), on_row=tell)
-        found[method.name] = folder / WEIGHTS
+        found[name] = folder / WEIGHTS
     return found
+
+
+def _folder(method: Method) -> str:
+    """Return a name for the folder of a training, another one when the training is changed."""
+    mark = hashlib.sha256(json.dumps([method.name, method.training], sort_keys=True).encode()).hexdigest()[:8]
+    return "".join(letter if letter.isalnum() else "-" for letter in method.name) + "-" + mark

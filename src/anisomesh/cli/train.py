@@ -2,19 +2,23 @@
 
 from __future__ import annotations
 
+import os
 import sys
 from pathlib import Path
 from typing import Annotated, Any
 
 import typer
 
+from anisomesh.cli.progress import announce_compilation, progress
 from anisomesh.cli.report import counted
 
 
 def command(
     config: Annotated[
         Path,
-        typer.Argument(metavar="CONFIG", help="Training run as a TOML file, or the name of a shipped one: default."),
+        typer.Argument(
+            metavar="CONFIG", help="Training run as a TOML file, or the name of one of the package: default, paper."
+        ),
     ],
     resume: Annotated[bool, typer.Option("--resume", help="Go on from the checkpoint of the run.")] = False,
     threads: Annotated[int, typer.Option("--threads", min=1, help="Worker threads of torch.")] = 1,
@@ -28,16 +32,22 @@ def command(
 
     from anisomesh.learn.config import load_training
     from anisomesh.learn.manifest import files_of
-    from anisomesh.learn.train import WEIGHTS, train
+    from anisomesh.learn.run import WEIGHTS
+    from anisomesh.learn.train import train
 
     torch.set_num_threads(threads)
+    first = int(os.environ.get("RANK", "0")) == 0  # of those that torchrun starts, only one talks
+    quiet = quiet or not first
     options = load_training(config)
     files = files_of(Path(options.data))
     if not quiet:
         counts = counted(len(files.training), "training item"), counted(len(files.validation), "validation item")
         print(f"{counts[0]}, {counts[1]}", file=sys.stderr, flush=True)
+    with progress(quiet) as display:
+        announce_compilation(display, "train")
     rows = train(options, files, resume=resume, on_row=lambda row: None if quiet else _print(row))
-    typer.echo(f"{counted(len(rows), 'epoch')}; wrote {Path(options.out) / WEIGHTS}")
+    if first:
+        typer.echo(f"{counted(len(rows), 'epoch')}; wrote {Path(options.out) / WEIGHTS}")
 
 
 def _print(row: dict[str, Any]) -> None:

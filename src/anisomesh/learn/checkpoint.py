@@ -32,7 +32,13 @@ Network = StretchNetwork | PaperNetwork
 
 
 def save_weights(network: Network, path: Path, facts: dict[str, Any]) -> None:
-    """Write the weights of a network, its sizes, and facts about it, in one file of safetensors."""
+    """Write the weights of a network, its sizes, and facts about it, in one file of safetensors.
+
+    Raises
+    ------
+    MeshFileError
+        If the file cannot be written.
+    """
     kind = next(name for name, (made, _) in KINDS.items() if isinstance(network, made))
     head = {"kind": kind, "network": json.dumps(asdict(network.options)), "facts": json.dumps(facts)}
     _write(path, save({name: value.contiguous() for name, value in network.state_dict().items()}, metadata=head))
@@ -57,11 +63,17 @@ def load_weights(path: Path) -> tuple[Network, dict[str, Any]]:
 
 
 def save_state(path: Path, network: nn.Module, optimiser: torch.optim.Optimizer, state: dict[str, Any]) -> None:
-    """Write all that a training run needs to go on: weights, the moments of the optimiser, and numbers of its own."""
+    """Write all that a training run needs to go on: weights, the moments of the optimiser, and numbers of its own.
+
+    Raises
+    ------
+    MeshFileError
+        If the file cannot be written.
+    """
     tensors = {f"weights.{name}": value.contiguous() for name, value in network.state_dict().items()}
     names = [name for name, _ in network.named_parameters()]
-    for name, values in zip(names, optimiser.state_dict()["state"].values(), strict=False):
-        tensors |= {f"optimiser.{name}.{key}": value.contiguous() for key, value in values.items()}
+    for number, values in optimiser.state_dict()["state"].items():  # parameters without a gradient have none
+        tensors |= {f"optimiser.{names[number]}.{key}": value.contiguous() for key, value in values.items()}
     _write(path, save(tensors, metadata={"state": json.dumps(state)}))
 
 

@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
+from contextlib import contextmanager
+
 import torch
 
 from anisomesh.errors import OptionError
@@ -13,7 +16,7 @@ def device_of(name: str, rank: int = 0) -> torch.device:
     Parameters
     ----------
     name
-        As torch names it, or ``"auto"``: a GPU where there is one, each process its own, else the CPU.
+        As torch names it; ``"cuda"`` is a GPU for each process, ``"auto"`` the same where there is one, else the CPU.
     rank
         Number of the process on this machine.
 
@@ -22,9 +25,9 @@ def device_of(name: str, rank: int = 0) -> torch.device:
     OptionError
         If there is no such device.
     """
-    if name == "auto":
+    if name in ("auto", "cuda"):
         count = torch.cuda.device_count() if torch.cuda.is_available() else 0
-        name = f"cuda:{rank % count}" if count else "cpu"
+        name = f"cuda:{rank % count}" if count else {"auto": "cpu"}.get(name, name)
     try:
         device = torch.device(name)
         torch.empty(0, device=device)
@@ -32,3 +35,17 @@ def device_of(name: str, rank: int = 0) -> torch.device:
         reason = str(error).strip().splitlines()[0]
         raise OptionError(f"device {name!r} cannot be used here: {reason}") from error
     return device
+
+
+@contextmanager
+def deterministic() -> Iterator[None]:
+    """Have torch take sums in the same order every time, for any number of threads, until the end of the block.
+
+    On a GPU it warns where it cannot.
+    """
+    before = torch.are_deterministic_algorithms_enabled()
+    torch.use_deterministic_algorithms(True, warn_only=torch.cuda.is_available())
+    try:
+        yield
+    finally:
+        torch.use_deterministic_algorithms(before)

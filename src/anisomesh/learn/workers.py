@@ -6,10 +6,13 @@ import os
 from collections.abc import Iterable, Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass
+from datetime import timedelta
 
 import torch
 import torch.distributed as distributed
 from torch import nn
+
+_PATIENCE = timedelta(days=1)  # the others wait while the first one validates
 
 
 @dataclass(frozen=True)
@@ -62,7 +65,7 @@ def workers() -> Iterator[Workers]:
     if size == 1:
         yield Workers()
         return
-    distributed.init_process_group("gloo")
+    distributed.init_process_group("gloo", timeout=_PATIENCE)
     try:
         local_rank = int(os.environ.get("LOCAL_RANK", "0"))
         yield Workers(rank=distributed.get_rank(), size=size, local_rank=local_rank)
