@@ -5,9 +5,10 @@ import pytest
 from anisomesh.batch.inputs import inputs_of, make_shape
 from anisomesh.batch.suite import load_suite, parse_suite, shipped_suites
 from anisomesh.errors import OptionError
+from anisomesh.learn.shipped import shipped_weights
 from anisomesh.options import RemeshOptions
 
-LEARNING = ("ablation-loss", "ablation-laplacian", "networks")
+LEARNING = ("ablation-loss", "ablation-laplacian")
 TABLE = {"shapes": ["sphere:100"], "methods": [{"name": "ours", "method": "anisomesh"}]}
 
 
@@ -25,8 +26,19 @@ def test_shipped_suites_load_and_their_shapes_and_options_exist(name):
 
 
 def test_all_suites_of_the_paper_are_there():
-    plain = {"smoke", "table1", "rocker-fertility", "zeroshot", "torus", "timing", "noise", "neural"}
+    plain = {"smoke", "table1", "rocker-fertility", "zeroshot", "torus", "timing", "noise", "neural", "networks"}
     assert set(shipped_suites()) >= plain | set(LEARNING)
+
+
+def test_networks_that_shipped_suites_name_come_with_the_package():
+    named = {
+        method.options["weights"]
+        for name in shipped_suites()
+        for method in load_suite(name).methods
+        if "weights" in method.options
+    }
+    assert named
+    assert named <= set(shipped_weights())
 
 
 @pytest.mark.parametrize("name", LEARNING)
@@ -53,6 +65,7 @@ def test_networks_of_shipped_suites_can_be_trained(name):
         ({"methods": [{"name": "x", "method": "anisomeshh"}]}, "did you mean 'anisomesh'"),
         ({"methods": [{"name": "x", "method": "acvd", "option": {}}]}, "did you mean 'options'"),
         ({"methods": 2 * TABLE["methods"]}, "same name"),
+        ({"methods": [{"name": "x", "method": "anisomesh", "training": "default"}]}, "expected a table"),
     ],
 )
 def test_errors_say_what_was_meant(change, message):

@@ -5,6 +5,9 @@ from __future__ import annotations
 import os
 from pathlib import Path
 
+from anisomesh.errors import OptionError
+from anisomesh.toml import hint
+
 DEFAULT = "default"
 _FOLDER = Path(__file__).parent / "weights"
 
@@ -25,6 +28,18 @@ def configuration_path(name: str) -> Path:
 
 
 def weights_path(weights: str | os.PathLike[str] | None) -> Path:
-    """Return the file of weights: of a shipped network by its name, of the default one for None, or the file named."""
+    """Return the file of weights: of a shipped network by its name, of the default one for None, or the file named.
+
+    Raises
+    ------
+    OptionError
+        If there is no such file.
+    """
     name = DEFAULT if weights is None else os.fspath(weights)
-    return _FOLDER / f"{name}.safetensors" if name in shipped_weights() else Path(name)
+    path = _FOLDER / f"{name}.safetensors" if name in shipped_weights() else Path(name)
+    if not path.is_file():
+        known = shipped_weights()
+        raise OptionError(
+            f"{name}: no file of weights, and no network of the package ({', '.join(known)}){hint(name, known)}"
+        )
+    return path
