@@ -15,11 +15,19 @@ from anisomesh.metric.curvature import principal_curvatures
 from anisomesh.metric.tangent import tangent_frames, unit_normals
 from anisomesh.metric.tensor import MetricName, compute_metric, curvature_metric
 from anisomesh.options import RemeshOptions
+from anisomesh.surface.features import share_of_flat_edges
 from anisomesh.surface.mesh import Surface
 from anisomesh.surface.subdivide import Refined
 
 MEASURED_SHARE = 0.7
 """Of the measured curvature in the hybrid metric; the best of 0.3, 0.5 and 0.7 on validation families."""
+
+
+DESIGNED = 0.1
+"""Share of the edges between faces in one plane from which on a surface was designed, and has no noise to take away.
+
+Of training meshes with noise of .05 mean edge lengths none has more than .007, of machine parts most have .1 to .7.
+"""
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -89,7 +97,8 @@ def estimated(
     require_torch()
     from anisomesh.learn.predict import predict
 
-    found = predict(working, options.weights, device=options.device, denoise=options.denoise)
+    denoise = options.denoise and share_of_flat_edges(plain) < DESIGNED
+    found = predict(working, options.weights, device=options.device, denoise=denoise)
     if found.noise > 0.0:
         plain, working = plain.with_points(found.points[: plain.n_points]), working.with_points(found.points)
     tensors, extra = found.tensors, found.extra

@@ -8,10 +8,12 @@ torch = pytest.importorskip("torch")
 import anisomesh  # noqa: E402
 from anisomesh.errors import OptionError  # noqa: E402
 from anisomesh.evaluation.report import evaluate  # noqa: E402
-from anisomesh.learn.checkpoint import WeightsError, load_weights  # noqa: E402
+from anisomesh.learn.checkpoint import load_weights  # noqa: E402
 from anisomesh.learn.predict import NOISE_FLOOR, predict  # noqa: E402
 from anisomesh.learn.shipped import shipped_weights, weights_path  # noqa: E402
+from anisomesh.surface.mesh import Surface  # noqa: E402
 from anisomesh.surface.noise import with_noise  # noqa: E402
+from anisomesh.surface.prepare import prepare  # noqa: E402
 from anisomesh.surface.shapes import box, ellipsoid, sphere, torus, twisted_ring  # noqa: E402
 
 
@@ -86,6 +88,32 @@ def test_little_noise_and_creases_stay():
         assert found.noise == 0.0
 
 
+def voxels(n=16):
+    """Return the sides of the cubes of a grid that are within a ball, made of the squares between in and out."""
+    inside = np.linalg.norm(np.indices((n + 2,) * 3) - (n + 1) / 2.0, axis=0) < 0.45 * n
+    corners = []
+    for axis in range(3):
+        ahead = np.roll(inside, -1, axis)
+        u, v = np.eye(3)[[(axis + 1) % 3, (axis + 2) % 3]]
+        for here, turned in ((inside & ~ahead, False), (ahead & ~inside, True)):
+            low = np.argwhere(here) + np.eye(3)[axis]
+            square = np.stack([low, low + u, low + u + v, low + v], axis=1)
+            corners.append(square[:, ::-1] if turned else square)
+    squares = np.concatenate(corners)
+    points, index = np.unique(squares.reshape(-1, 3), axis=0, return_inverse=True)
+    faces = index.reshape(-1, 4)
+    return prepare(Surface(points, np.concatenate([faces[:, [0, 1, 2]], faces[:, [0, 2, 3]]]))).surface
+
+
+def test_steps_of_voxels_are_no_noise():
+    ball = voxels()
+    assert predict(ball.with_points(ball.points / ball.diagonal)).noise > NOISE_FLOOR  # it looks like some
+    result = anisomesh.remesh(ball, n_vertices=800, max_iterations=20)
+    assert result.noise == 0.0
+    away = np.abs(result.surface.points - np.round(result.surface.points)).min(axis=1)
+    assert np.median(away) < 1e-3
+
+
 @pytest.mark.parametrize("surface", [box(n=1), sphere(0)])
 def test_meshes_of_few_points_have_graphs_without_edges(surface):
     found = predict(surface.with_points(surface.points / surface.diagonal))
@@ -114,10 +142,12 @@ def test_the_hybrid_metric_is_between_the_two(egg):
 
 def test_weights_and_devices_that_are_not_there(egg, tmp_path):
     for words, kind, message in (
-        ({"embedding": "neural", "weights": tmp_path / "none"}, WeightsError, "none"),
+        ({"embedding": "neural", "weights": tmp_path / "none"}, OptionError, "none"),
+        ({"embedding": "neural", "weights": "defualt"}, OptionError, "did you mean 'default'"),
+        ({"weights": "default", "metric": "uniform"}, OptionError, "and no other"),
         ({"embedding": "direct", "weights": "default"}, OptionError, "embedding 'direct' has none"),
         ({"embedding": "neural", "device": "tpu"}, OptionError, "expected one of cpu, cuda"),
-        ({"embedding": "hybrid", "metric": "uniform"}, OptionError, "takes no other"),
+        ({"embedding": "hybrid", "metric": "uniform"}, OptionError, "and no other"),
     ):
         with pytest.raises(kind, match=message):
             anisomesh.remesh(egg, n_vertices=100, **words)

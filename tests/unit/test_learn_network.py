@@ -69,6 +69,14 @@ def test_lines_come_back_from_tensors_and_tensors_from_lines(seed):
     assert np.linalg.eigvalsh(tensors_of(100.0 * lines, frames)).max() <= np.exp(MOST) * (1 + 1e-9)
 
 
+def test_a_metric_that_is_the_same_all_around_has_no_line_however_large():
+    normals = np.random.default_rng(0).normal(size=(20, 3))
+    normals /= np.linalg.norm(normals, axis=1, keepdims=True)
+    across = normals[:, :, None] * normals[:, None, :]
+    tensors = across + 4.0 * (np.eye(3) - across)  # as of an embedding that doubles all lengths
+    np.testing.assert_allclose(directions_of(tensors)[1], 0.0, atol=1e-9)
+
+
 def test_the_loss_is_zero_for_the_answer_and_a_distance_elsewhere():
     wanted = torch.tensor([[3.0, 4.0], [0.0, 0.0], [1.0, 0.0]])
     weight = torch.tensor([1.0, 1.0, 0.0])
@@ -116,6 +124,15 @@ def test_metric_and_offsets_turn_with_the_mesh_and_ignore_the_order(surface):
     size = np.linalg.norm(my_offsets, axis=1).max()
     assert size > 0.0
     np.testing.assert_allclose(their_offsets, my_offsets[order] @ turn.T, atol=1e-3 * size)
+
+
+def test_it_does_not_matter_how_many_edges_are_worked_on_at_once(monkeypatch):
+    surface, network = shaken(torus(n_major=24, n_minor=12)), StretchNetwork(SMALL).eval()
+    whole, offsets = predicted(network, surface)
+    monkeypatch.setattr("anisomesh.learn.network._AT_ONCE", 7)
+    parts, other_offsets = predicted(network, surface)
+    np.testing.assert_allclose(parts, whole, rtol=1e-5)
+    np.testing.assert_allclose(other_offsets, offsets, atol=1e-6 * np.abs(offsets).max())
 
 
 def test_noise_moves_the_mesh_and_not_the_lines_wanted():

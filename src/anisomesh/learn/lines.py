@@ -16,12 +16,13 @@ Frames = npt.NDArray[np.float64]
 
 
 def directions_of(tensors: PointTensors) -> tuple[PointVectors, npt.NDArray[np.float64]]:
-    """Return the direction of largest metric (N, 3), and the logarithm of largest over smallest eigenvalue (N,).
+    """Return the direction of largest metric (N, 3), and the logarithm of largest over middle eigenvalue (N,).
 
-    Of the paper's metric, with eigenvalues 1, 1 and r^2, these are v_max and 2 log r.
+    Of the paper's metric, with eigenvalues 1, 1 and r^2, these are v_max and 2 log r. Of that of an embedding, which is
+    1 along the normal and no less in the surface, they are the direction and square of its stretch.
     """
     values, vectors = np.linalg.eigh(tensors)
-    return np.asarray(vectors[:, :, 2]), np.asarray(np.log(values[:, 2] / np.maximum(values[:, 0], 1e-30)))
+    return np.asarray(vectors[:, :, 2]), np.asarray(np.log(values[:, 2] / np.maximum(values[:, 1], 1e-30)))
 
 
 def lines_in(frames: Frames, directions: PointVectors, logarithms: npt.NDArray[np.float64]) -> npt.NDArray[np.float32]:

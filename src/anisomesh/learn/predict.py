@@ -15,7 +15,7 @@ import torch
 from anisomesh._arrays import EmbeddedPoints, Points, PointTensors
 from anisomesh.embedding.given import pulled_back_metric
 from anisomesh.learn.checkpoint import Network, load_weights
-from anisomesh.learn.device import device_of
+from anisomesh.learn.device import deterministic, device_of
 from anisomesh.learn.lines import tensors_of
 from anisomesh.learn.network import StretchNetwork
 from anisomesh.learn.paper import PaperNetwork, seen_of
@@ -41,7 +41,7 @@ class Predicted:
     points
         The points without noise (V, 3); those of the surface itself where none is taken away.
     noise
-        What is taken away: root mean square height over the surface without noise, in mean edge lengths.
+        What is taken away: root mean square along the normals of the surface, in mean edge lengths.
     extra
         Extra coordinates of the embedding (V, 5), by the paper's network; None by the default one.
     """
@@ -73,7 +73,9 @@ def predict(
     WeightsError
         If the file cannot be read.
     OptionError
-        If there is no such device.
+        If there is no such file or device.
+    MemoryError
+        If there is too little memory, on the device or beside it.
 
     Notes
     -----
@@ -81,11 +83,16 @@ def predict(
     again on the surface without it, which it sees better, until it finds no more, three times at most.
     """
     path = weights_path(weights).resolve()
-    network = _loaded(path, path.stat().st_mtime_ns if path.exists() else 0, device_of(device))
-    with torch.inference_mode(), _one_thread():
-        if isinstance(network, StretchNetwork):
-            return _stretch(network, surface, denoise=denoise)
-        return _extra(network, surface)
+    network = _loaded(path, path.stat().st_mtime_ns, device_of(device))
+    with torch.inference_mode(), _one_thread(), deterministic():
+        try:
+            if isinstance(network, StretchNetwork):
+                return _stretch(network, surface, denoise=denoise)
+            return _extra(network, surface)
+        except RuntimeError as error:  # of torch, which has no error of its own for the memory of the CPU
+            if isinstance(error, torch.OutOfMemoryError) or "allocate memory" in str(error):
+                raise MemoryError(str(error)) from error
+            raise
 
 
 def _stretch(network: StretchNetwork, surface: Surface, *, denoise: bool) -> Predicted:
@@ -112,8 +119,6 @@ def _extra(network: PaperNetwork, surface: Surface) -> Predicted:
 
 def _height(surface: Surface, offsets: Points) -> float:
     """Return the root mean square of the offsets (V, 3) along the normals, in mean edge lengths."""
-    if surface.n_faces == 0:
-        return 0.0
     heights = np.einsum("nx,nx->n", surface.point_normals, offsets)
     return float(np.sqrt((heights**2).mean()) / surface.edge_lengths.mean())
 

@@ -9,6 +9,7 @@ from anisomesh._arrays import Points
 from anisomesh.surface import geometry
 from anisomesh.surface.mesh import Surface
 
+_FLAT = 1e-3  # radians
 _TURN = 45.0  # degrees by which a crease turns at a corner
 
 
@@ -17,6 +18,16 @@ def sharp_edges(surface: Surface, angle: float) -> npt.NDArray[np.bool_]:
     first, second = surface.edge_faces.T
     cosine = np.einsum("ex,ex->e", surface.face_normals[first], surface.face_normals[second])
     return np.asarray((second >= 0) & (cosine < np.cos(np.radians(angle))))
+
+
+def share_of_flat_edges(surface: Surface) -> float:
+    """Return the share of the inner edges whose faces are in one plane, to a thousandth of a radian.
+
+    Parts that were designed have many, surfaces that were measured next to none.
+    """
+    first, second = surface.edge_faces[surface.edge_faces[:, 1] >= 0].T
+    sine = np.linalg.norm(np.cross(surface.face_normals[first], surface.face_normals[second]), axis=1)
+    return float((sine < _FLAT).mean()) if len(sine) else 1.0
 
 
 def corners(surface: Surface, sharp: npt.NDArray[np.bool_]) -> npt.NDArray[np.bool_]:
