@@ -1,6 +1,6 @@
 """Creases and corners at a fifth of the vertices: ten parts made by code and the CAD meshes of the test folder.
 
-Usage: python benchmarks/crease_coverage.py [--ratio 0.2] [--folder test] [--only NAME]
+Usage: python benchmarks/crease_coverage.py [--ratio 0.2] [--embedding direct] [--folder test] [--only NAME]
 
 Parts made by code have their long edges split first, to some 2,000 vertices. The meshes of the folder come from
 ``ANISOMESH_DATA``. Exit code 1 if a corner is missed or less than 99 % of the creases covered.
@@ -19,7 +19,7 @@ from scipy.spatial import cKDTree
 
 import anisomesh
 from anisomesh.evaluation.preservation import feature_preservation
-from anisomesh.options import RemeshOptions
+from anisomesh.options import EMBEDDINGS, RemeshOptions
 from anisomesh.surface.features import corners, sharp_edges
 from anisomesh.surface.mesh import Surface
 from anisomesh.surface.parts import sparse_parts
@@ -37,9 +37,9 @@ def fine(part: Surface) -> Surface:
     return split_long_edges(part, edge, max_faces=20 * FINE).surface
 
 
-def measure(name: str, surface: Surface, ratio: float) -> tuple[str, bool]:
+def measure(name: str, surface: Surface, ratio: float, embedding: str) -> tuple[str, bool]:
     """Return a row of the table, and whether the figures are reached."""
-    result = anisomesh.remesh(surface, ratio=ratio)
+    result = anisomesh.remesh(surface, ratio=ratio, embedding=embedding)
     before, after = result.prepared, result.surface
     edge = float(after.edge_lengths.mean())
     kept = feature_preservation(before, after, crease_angle=ANGLE, tolerance=REACH * edge)
@@ -57,6 +57,7 @@ def measure(name: str, surface: Surface, ratio: float) -> tuple[str, bool]:
 def main() -> int:
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--ratio", type=float, default=0.2)
+    parser.add_argument("--embedding", choices=EMBEDDINGS, default="direct")
     parser.add_argument("--folder", default="test")
     parser.add_argument("--only", default="")
     options = parser.parse_args()
@@ -73,7 +74,7 @@ def main() -> int:
     missed = 0
     for name, surface in inputs.items():
         if options.only in name:
-            row, reached = measure(name, surface, options.ratio)
+            row, reached = measure(name, surface, options.ratio, options.embedding)
             print(row, flush=True)
             missed += not reached
     return 1 if missed else 0

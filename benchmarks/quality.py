@@ -33,7 +33,7 @@ def closed_meshes(data: Path) -> list[Path]:
 
 
 def measure(path: Path, ratio: float, sharpness: float) -> dict[str, Any]:
-    result = anisomesh.remesh(anisomesh.load(path), ratio=ratio, sharpness=sharpness)
+    result = anisomesh.remesh(anisomesh.load(path), ratio=ratio, sharpness=sharpness, embedding="direct")
     evaluation = anisomesh.evaluate(result.prepared, result.surface)
     distance = evaluation.distance
     return {

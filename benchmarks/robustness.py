@@ -1,6 +1,7 @@
 """What the command line makes of every mesh of a folder: crashes, refusals, hangs, faults, new intersections.
 
-Usage: python benchmarks/robustness.py [--ratios 1 0.2 0.1] [--only NAME] [--folders wild zeroshot test] [--fresh]
+Usage: python benchmarks/robustness.py [--ratios 1 0.2 0.1] [--embedding direct] [--only NAME]
+       [--folders wild zeroshot test] [--fresh]
 
 Rows are kept in benchmarks/out/robustness.jsonl; a run that was stopped goes on. Exit code 1 if a run crashed, hung,
 printed what it should not, or gave an invalid mesh without saying so.
@@ -20,6 +21,7 @@ from pathlib import Path
 from typing import Any
 
 import anisomesh
+from anisomesh.options import EMBEDDINGS
 
 OUT = Path(__file__).parent / "out" / "robustness.jsonl"
 LIMIT = 600  # seconds
@@ -27,13 +29,13 @@ SAME = ("components", "euler", "boundary_loops")  # as in the input
 COUNTS = ("nonmanifold_edges", "nonmanifold_vertices", "flipped", "duplicate_faces", "new_intersections")
 
 
-def run(path: Path, ratio: float) -> dict[str, Any]:
+def run(path: Path, ratio: float, embedding: str) -> dict[str, Any]:
     """Run the command on a mesh and return what it did."""
     with tempfile.TemporaryDirectory() as folder:
         out = Path(folder) / "out.ply"
-        words = ["remesh", str(path), "-o", str(out), "--ratio", str(ratio), "--json", "--quiet"]
-        command = [sys.executable, "-c", "from anisomesh.cli.main import run; run()", *words]
-        row: dict[str, Any] = {"mesh": f"{path.parent.name}/{path.name}", "ratio": ratio}
+        words = ["remesh", str(path), "-o", str(out), "--ratio", str(ratio), "--embedding", embedding]
+        command = [sys.executable, "-c", "from anisomesh.cli.main import run; run()", *words, "--json", "--quiet"]
+        row: dict[str, Any] = {"mesh": f"{path.parent.name}/{path.name}", "ratio": ratio, "embedding": embedding}
         start = time.perf_counter()
         try:
             done = subprocess.run(command, capture_output=True, text=True, timeout=LIMIT, check=False)
@@ -64,6 +66,7 @@ def faults(row: dict[str, Any]) -> list[str]:
 def main() -> int:
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--ratios", type=float, nargs="+", default=[1.0, 0.2, 0.1])
+    parser.add_argument("--embedding", choices=EMBEDDINGS, default="direct")
     parser.add_argument("--folders", nargs="+", default=["wild", "zeroshot", "test"])
     parser.add_argument("--only", default="")
     parser.add_argument("--fresh", action="store_true", help="forget earlier rows")
@@ -78,13 +81,13 @@ def main() -> int:
     if arguments.fresh:
         OUT.unlink(missing_ok=True)
     rows = [json.loads(line) for line in OUT.read_text().splitlines()] if OUT.exists() else []
-    known = {(row["mesh"], row["ratio"]): row for row in rows}
+    known = {(row["mesh"], row["ratio"], row.get("embedding")): row for row in rows}
     chosen = []
     for ratio in arguments.ratios:
         for path in paths:
-            key = (f"{path.parent.name}/{path.name}", ratio)
+            key = (f"{path.parent.name}/{path.name}", ratio, arguments.embedding)
             if key not in known:
-                known[key] = run(path, ratio)
+                known[key] = run(path, ratio, arguments.embedding)
                 with OUT.open("a") as file:
                     file.write(json.dumps(known[key]) + "\n")
             row = known[key]

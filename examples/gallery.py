@@ -1,6 +1,6 @@
 """Remesh three shapes made by code and draw the results in one picture, as in the README.
 
-Usage: python examples/gallery.py [OUT]
+Usage: python examples/gallery.py [OUT]    (extra: picture)
 """
 
 from __future__ import annotations

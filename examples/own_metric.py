@@ -1,8 +1,9 @@
 """Prescribe the stretch of the triangles by a metric of your own.
 
-A metric is one symmetric positive definite 3 x 3 matrix per point: an edge ``e`` counts as
-``sqrt(e @ M @ e)`` long, and the result has triangles that are equilateral in that length. Here edges along z
-count a third of their length, so that the triangles become about three times as long along z as across.
+A metric is one symmetric positive definite 3 x 3 matrix per point of the input as it is passed, in model units and
+axes: an edge ``e`` counts as ``sqrt(e @ M @ e)`` long, and the result has triangles that are about equilateral in that
+length. Only ratios of lengths matter, since ``n_vertices`` sets the size. Here edges along z count a third of their
+length, so that the triangles become about three times as long along z as across.
 """
 
 import numpy as np

@@ -1,6 +1,6 @@
 """Remesh a surface, look at the report, write the mesh and a picture.
 
-Run it with the file to remesh, or without for a built-in sample:
+Run it with the file to remesh, or without for a built-in sample (extra: picture):
 
     python examples/remesh_a_surface.py bunny.obj
 """

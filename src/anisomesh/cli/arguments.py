@@ -81,7 +81,8 @@ def remesh_options(
 Source = Annotated[Path, typer.Argument(metavar="IN", help="Mesh to remesh: OBJ, OFF, PLY, STL, GLB, VTU, ...")]
 Vertices = Annotated[int | None, typer.Option("--vertices", "-n", min=4, help="Number of vertices of the result.")]
 Ratio = Annotated[
-    float | None, typer.Option("--ratio", callback=positive, help="Vertices of the result per vertex of the input.")
+    float | None,
+    typer.Option("--ratio", callback=positive, help="Vertices of the result per vertex of the repaired input."),
 ]
 MetricName = Annotated[
     Metric, typer.Option("--metric", help="curvature: the paper's; approximation: least error; uniform: no stretch.")

@@ -66,10 +66,18 @@ def command(
         Path | None,
         typer.Option(metavar="FILE", help="Edges to keep: a text file, two vertex numbers a line, the first is 0."),
     ] = None,
-    embedding: Annotated[Embedding, typer.Option(help="How the surface is embedded.")] = Embedding.auto,
+    embedding: Annotated[
+        Embedding,
+        typer.Option(
+            help="direct: measured curvature; neural: a network; hybrid: both; auto: hybrid where torch is installed "
+            "and the metric is curvature."
+        ),
+    ] = Embedding.auto,
     weights: Annotated[
         str | None,
-        typer.Option(metavar="FILE", help="Trained network in place of the one of the package, or its name."),
+        typer.Option(
+            metavar="FILE", help="Weights to use: a file of anisomesh train, or the name of a network of the package."
+        ),
     ] = None,
     device: Annotated[Device, typer.Option(help="Where the network runs.")] = Device.cpu,
     denoise: Annotated[
