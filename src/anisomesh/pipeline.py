@@ -18,10 +18,8 @@ from anisomesh.cvt.features import Features
 from anisomesh.cvt.optimise import Optimised, Status
 from anisomesh.cvt.voronoi import RestrictedVoronoi
 from anisomesh.dual.refine import Refined, refine
-from anisomesh.embedding.direct import embed
-from anisomesh.embedding.given import given_embedding
 from anisomesh.errors import MetricError, OptionError, TimeLimitError
-from anisomesh.estimate import estimated
+from anisomesh.estimate import embedded, estimated
 from anisomesh.evaluation.validity import Validity, check_validity
 from anisomesh.memory import check_memory
 from anisomesh.metric.tensor import MetricName
@@ -144,11 +142,7 @@ def _remesh(
         estimate = estimated(given, split, wanted, options)
         working = estimate.working
     with run.stage("embed"):
-        embedding = (
-            embed(working, estimate.tensors, max_iterations=options.embedding_iterations)
-            if estimate.extra is None
-            else given_embedding(working, estimate.extra)
-        )
+        embedding = embedded(estimate, options.embedding_iterations)
     run.check_time()
     with run.stage("cvt"):
         voronoi = RestrictedVoronoi(embedding.points, working.faces, threads=options.threads)

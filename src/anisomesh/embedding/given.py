@@ -11,10 +11,10 @@ from anisomesh.surface.geometry import sums_at_points
 from anisomesh.surface.mesh import Surface
 
 
-def given_embedding(surface: Surface, extra: EmbeddedPoints) -> Embedding:
-    """Return the embedding [xyz, extra] of a surface, from extra coordinates (V, k)."""
+def given_embedding(surface: Surface, extra: EmbeddedPoints, tensors: PointTensors) -> Embedding:
+    """Return the embedding [xyz, extra] of a surface, from extra coordinates (V, k) and the metric asked (V, 3, 3)."""
     points, gradient = np.concatenate([surface.points, extra], axis=1), face_gradient(surface)
-    metric = face_tensors(surface, pulled_back_metric(surface, extra), gradient.frames)
+    metric = face_tensors(surface, tensors, gradient.frames)
     return Embedding(
         points=points,
         scale=1.0,

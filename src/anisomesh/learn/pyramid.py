@@ -9,7 +9,7 @@ import numpy.typing as npt
 
 from anisomesh._kernels.pyramid import carry_to_points, edge_geometry, edge_invariants, fit_directions, spread_at_nodes
 from anisomesh.learn.graph import Graph, Level, graph_of, hierarchy
-from anisomesh.metric.tangent import tangent_frames
+from anisomesh.metric.tangent import or_z_axis, tangent_frames
 from anisomesh.surface.geometry import sums_at_points, unit
 from anisomesh.surface.mesh import Surface
 
@@ -145,7 +145,7 @@ def _mean_place(sums: Doubles, ancestor: Ints, n_nodes: int) -> _Places:
     columns = [np.bincount(ancestor, column, minlength=n_nodes) for column in sums.T]
     total = np.stack(columns, axis=1).astype(np.float64)
     mean = total[:, :6] / total[:, 6:]
-    return _Places(mean[:, :3], _some_normals(mean[:, 3:]), np.linalg.norm(mean[:, 3:], axis=1))
+    return _Places(mean[:, :3], or_z_axis(unit(mean[:, 3:])), np.linalg.norm(mean[:, 3:], axis=1))
 
 
 def _heights(levels: list[Level], places: list[_Places], k: int) -> Doubles:
@@ -157,13 +157,6 @@ def _heights(levels: list[Level], places: list[_Places], k: int) -> Doubles:
         away = places[k].positions - places[coarse].positions[owner]
         height[:, column] = np.einsum("vx,vx->v", places[coarse].normals[owner], away)
     return height
-
-
-def _some_normals(sums: Doubles) -> Doubles:
-    """Return unit normals (n, 3) along sums of normals, the z axis where these vanish."""
-    normals = unit(sums)
-    normals[~normals.any(axis=1)] = (0.0, 0.0, 1.0)
-    return normals
 
 
 def _scale(level: Level, heights: Doubles, place: _Places, ancestor: Ints, points: _Places, frames: Doubles) -> Scale:

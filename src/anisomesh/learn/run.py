@@ -178,7 +178,7 @@ class Run:
         other = [
             name
             for name, value in state["training"].items()
-            if name not in ("out", "data", "device", "start", "minutes") and mine.get(name) != value
+            if name not in (*_PLACES, "device", "minutes") and mine.get(name) != value
         ]
         if other or state["items"] != self._items():
             what = f"another {', '.join(other)}" if other else "other items"

@@ -16,9 +16,12 @@ LineField = npt.NDArray[np.complex128]
 
 def unit_normals(surface: Surface) -> PointVectors:
     """Return the point normals (V, 3) with the z axis where a point has none, so that all are unit vectors."""
-    normals = surface.point_normals.copy()
-    normals[~normals.any(axis=1)] = (0.0, 0.0, 1.0)
-    return normals
+    return or_z_axis(surface.point_normals)
+
+
+def or_z_axis(normals: PointVectors) -> PointVectors:
+    """Return unit normals (V, 3) with the z axis in place of those that are zero."""
+    return np.where(normals.any(axis=1, keepdims=True), normals, (0.0, 0.0, 1.0))
 
 
 def tangent_frames(normals: PointVectors) -> Frames:
