@@ -158,6 +158,7 @@ def evened(surface: Surface, recipe: Recipe) -> Surface:
     if low <= surface.n_points <= high and shape.mean() >= _EVEN:
         return surface
     if recipe.evening == "tetwild":
+        require_packages(recipe)
         surface = _tetwild(surface)
     result = remesh(surface, n_vertices=recipe.target, metric="uniform", threads=1, time_limit=_SECONDS)
     if result.validity.flipped or result.surface.n_points > high:
@@ -209,7 +210,6 @@ def _settling(blobs: Blobs, frame: Frame) -> Callable[[Points], Points]:
 
 def _tetwild(surface: Surface) -> Surface:
     """Return the boundary, seen from outside, of the tetrahedra that pytetwild makes of a surface."""
-    require_packages(Recipe(evening="tetwild"))
     import pytetwild
 
     arrays = np.array(surface.points), np.array(surface.faces, dtype=np.int32)  # it takes no read-only ones
