@@ -7,10 +7,12 @@ torch = pytest.importorskip("torch")
 
 from anisomesh.learn.config import TrainingOptions  # noqa: E402
 from anisomesh.learn.examples import example_of  # noqa: E402
+from anisomesh.learn.graph import graph_of  # noqa: E402
 from anisomesh.learn.items import Item  # noqa: E402
 from anisomesh.learn.lines import MOST, directions_of, lines_in, tensors_of  # noqa: E402
 from anisomesh.learn.losses import line_loss, offset_loss  # noqa: E402
-from anisomesh.learn.network import NetworkOptions, StretchNetwork  # noqa: E402
+from anisomesh.learn.messages import mean_by_scatter  # noqa: E402
+from anisomesh.learn.network import Block, NetworkOptions, StretchNetwork  # noqa: E402
 from anisomesh.learn.pyramid import N_EDGE, N_NODE, pyramid  # noqa: E402
 from anisomesh.learn.tasks import StretchTask  # noqa: E402
 from anisomesh.metric.curvature import principal_curvatures  # noqa: E402
@@ -124,6 +126,49 @@ def test_metric_and_offsets_turn_with_the_mesh_and_ignore_the_order(surface):
     size = np.linalg.norm(my_offsets, axis=1).max()
     assert size > 0.0
     np.testing.assert_allclose(their_offsets, my_offsets[order] @ turn.T, atol=1e-3 * size)
+
+
+def plain_block(block, x, graph):
+    """Return what a block gives by the formulas of its docstrings alone."""
+    layer, norm = block.convolution, block.norm
+    mean = mean_by_scatter(layer.own(x), layer.sent(x), layer.along, graph, 0.1)
+    mixed = torch.cat([x, mean], dim=1) @ layer.out.weight.T + layer.out.bias
+    away = mixed - mixed.mean(dim=0)
+    normal = away / torch.sqrt((away**2).mean(dim=0) + 1e-5) * norm.scale + norm.shift
+    return x + block.out(torch.where(normal > 0.0, normal, 0.1 * normal))
+
+
+@pytest.mark.parametrize("n_nodes", [1, 2, 600])
+def test_a_block_and_its_derivatives_are_those_of_the_plain_formulas(n_nodes):
+    torch.manual_seed(0)
+    graph = pyramid(shaken(torus(n_major=40, n_minor=15)), 1).scales[0].graph
+    if n_nodes < 3:
+        ends = np.arange(n_nodes)
+        along = np.random.default_rng(0).normal(size=(n_nodes, N_EDGE)).astype(np.float32)
+        graph = graph_of(n_nodes, ends, ends[::-1], along)
+    block = Block(8)
+    for values in block.parameters():
+        torch.nn.init.normal_(values)
+    x = torch.randn(n_nodes, 8, requires_grad=True)
+    factors = torch.randn(n_nodes, 8)
+    wanted, found = plain_block(block, x, graph), block(x, graph)
+    torch.testing.assert_close(found, wanted, atol=1e-4, rtol=1e-4)
+    inputs = [x, *block.parameters()]
+    theirs, mine = (torch.autograd.grad((factors * y).sum(), inputs) for y in (wanted, found))
+    for a, b in zip(mine, theirs, strict=True):
+        torch.testing.assert_close(a, b, atol=1e-4 * max(1.0, float(b.abs().max())), rtol=1e-4)
+
+
+def test_a_mesh_of_four_points_leaves_the_network_as_it_is():
+    torch.manual_seed(0)
+    network = StretchNetwork(SMALL).eval()  # its coarser graphs have one node, whose norm is the shift alone
+    before = {name: values.clone() for name, values in network.state_dict().items()}
+    points = np.array([[0.0, 0.0, 0.0], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]])
+    surface = Surface(points, np.array([[0, 2, 1], [0, 1, 3], [1, 2, 3], [2, 0, 3]]))
+    tensors, offsets = predicted(network, surface)
+    assert np.isfinite(tensors).all() and np.isfinite(offsets).all()
+    for name, values in network.state_dict().items():
+        assert torch.equal(values, before[name]), name
 
 
 def test_it_does_not_matter_how_many_edges_are_worked_on_at_once(monkeypatch):

@@ -8,7 +8,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from anisomesh._kernels import intersections as kernels
+from anisomesh._kernels import orientation
 from anisomesh.surface.intersections import self_intersections
 from anisomesh.surface.mesh import Surface
 from anisomesh.surface.shapes import box, cylinder, open_patch, sphere, torus
@@ -299,10 +299,10 @@ def determinant(a, b, c, d):
 def test_orientations_are_exact(points):
     a, b, c, d = points
     volume = determinant(a, b, c, d)
-    assert kernels.orient3d(np.array(points), 0, 1, 2, 3) == (volume > 0) - (volume < 0)
+    assert orientation.orient3d(np.array(points), 0, 1, 2, 3) == (volume > 0) - (volume < 0)
     for axis in range(3):
         area = normal_of(exact([a, b, c]))[axis]
-        assert kernels.orient2d(np.array(points), axis, 0, 1, 2) == (area > 0) - (area < 0)
+        assert orientation.orient2d(np.array(points), axis, 0, 1, 2) == (area > 0) - (area < 0)
 
 
 @given(st.integers(0, 2**32 - 1), st.sampled_from([0.0, 1.0, 100.0]))
@@ -314,7 +314,7 @@ def test_orientations_beside_a_line_and_a_plane_are_exact(seed, offset):
     on_line, on_plane = a + s * (b - a), a + s * (b - a) + t * (c - a)
     points = np.array([a, b, c, on_line, on_plane])
     volume = determinant(a, b, c, on_plane)
-    assert kernels.orient3d(points, 0, 1, 2, 4) == (volume > 0) - (volume < 0)
+    assert orientation.orient3d(points, 0, 1, 2, 4) == (volume > 0) - (volume < 0)
     for axis in range(3):
         area = normal_of(exact([a, b, on_line]))[axis]
-        assert kernels.orient2d(points, axis, 0, 1, 3) == (area > 0) - (area < 0)
+        assert orientation.orient2d(points, axis, 0, 1, 3) == (area > 0) - (area < 0)

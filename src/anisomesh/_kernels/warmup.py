@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from pathlib import Path
 
-from anisomesh._kernels import diagram, integrate, intersections, local_step, messages, neighbours, pyramid
+from anisomesh._kernels import diagram, integrate, intersections, local_step, messages, neighbours, orientation, pyramid
 
 _REMESH = (
     integrate.integrate_chunk,
@@ -35,7 +35,7 @@ _TRAIN = (
     messages.value_distances,
     messages.distances_back,
 )
-_EVALUATE = (intersections.choose_axes, intersections.sort_into_tree, intersections.find_pairs)
+_EVALUATE = (orientation.choose_axes, intersections.sort_into_tree, intersections.find_pairs)
 ENTRY_POINTS = {"remesh": _REMESH, "evaluate": _EVALUATE, "network": _NETWORK, "train": _TRAIN}
 """What each kind of work calls."""
 

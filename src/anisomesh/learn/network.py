@@ -60,10 +60,9 @@ class Norm(nn.Module):
 
     def forward(self, x: Tensor) -> Tensor:
         """Return (V, C) from (V, C)."""
-        mean = x.mean(dim=0)
-        away = x - mean
-        deviation = torch.sqrt((away * away).mean(dim=0) + _EPSILON)
-        return away / deviation * self.scale + self.shift
+        if len(x) < 2:  # batch_norm wants two; the one is its own mean
+            return (x - x) * self.scale + self.shift
+        return nn.functional.batch_norm(x, None, None, self.scale, self.shift, training=True, eps=_EPSILON)
 
 
 class Convolution(nn.Module):
@@ -83,8 +82,7 @@ class Convolution(nn.Module):
     def forward(self, x: Tensor, graph: Graph) -> Tensor:
         """Return (V, C) from (V, inputs)."""
         mean = mean_of_neighbours(self.own(x), self.sent(x), self.along, graph, _SLOPE)
-        mixed: Tensor = self.out(torch.cat([x, mean], dim=1))
-        return mixed
+        return linear_of_both(self.out, x, mean)
 
 
 class Block(nn.Module):
@@ -99,8 +97,8 @@ class Block(nn.Module):
 
     def forward(self, x: Tensor, graph: Graph) -> Tensor:
         """Return (V, C) from (V, C)."""
-        inner = nn.functional.leaky_relu(self.norm(self.convolution(x, graph)), _SLOPE)
-        added: Tensor = x + self.out(inner)
+        inner = nn.functional.leaky_relu(self.norm(self.convolution(x, graph)), _SLOPE, inplace=True)
+        added: Tensor = self.out(inner).add_(x)
         return added
 
 
@@ -137,14 +135,14 @@ class Head(nn.Module):
         """Return lines (V, 2) and vectors (V, 3) from (V, C)."""
         edges, device = scale.graph.edges_on(x.device), x.device
         share = 1.0 / torch.bincount(edges.node, minlength=len(x)).clamp(min=1)
-        of_edges = self._of_edges(x, edges) * share[edges.node, None]
+        of_edges = self._of_edges(x, edges, share)
         direct, dual, *mixing, vector = torch.split(of_edges, [_LINES] * (2 + _ROUNDS) + [1], dim=1)
         fitted, last, *keeping = torch.split(self.of_nodes(x), _LINES, dim=1)
         turns, duals, ties, ways, fit = (
             torch.from_numpy(values).to(device)
             for values in (scale.turns, scale.duals, scale.ties, scale.ways, scale.fit)
         )
-        along = direct[:, :, None] * turns[:, None] + dual[:, :, None] * duals[:, None]
+        along = torch.addcmul(direct[:, :, None] * turns[:, None], dual[:, :, None], duals[:, None])
         lines = _at_nodes(along, edges.node, len(x)) + fitted[:, :, None] * fit[:, None]
         for mix, keep in zip(mixing, keeping, strict=True):
             carried = turned(lines[edges.neighbour], ties[:, None])
@@ -152,13 +150,17 @@ class Head(nn.Module):
         vectors = _at_nodes(vector * ways, edges.node, len(x))
         return (last[:, :, None] * lines).sum(dim=1), vectors
 
-    def _of_edges(self, x: Tensor, edges: Edges) -> Tensor:
-        """Return the factors of the edges (E, ...), some edges at a time: what is between is many times larger."""
+    def _of_edges(self, x: Tensor, edges: Edges, share: Tensor) -> Tensor:
+        """Return the factors of the edges (E, ...) times the shares of their nodes (V,), some edges at a time.
+
+        What is between is many times larger.
+        """
         start, end = self.start(x), self.end(x)
         parts = []
         for node, neighbour, along in zip(*(torch.split(values, _AT_ONCE) for values in edges), strict=True):
             inner = start[node] + end[neighbour] + self.along(along)
-            parts.append(self.of_edges(nn.functional.leaky_relu(inner, _SLOPE)))
+            factors = self.of_edges(nn.functional.leaky_relu(inner, _SLOPE, inplace=True))
+            parts.append(factors.mul_(share[node, None]))
         return torch.cat(parts)
 
 
@@ -223,9 +225,16 @@ class StretchNetwork(nn.Module):
         for k in reversed(range(len(pyramid.scales) - 1)):
             scale = pyramid.scales[k]
             cluster = torch.from_numpy(scale.cluster).to(device)
-            x = self.join[k](torch.cat([kept[k], features[k + 1][cluster]], dim=1))
+            x = linear_of_both(self.join[k], kept[k], features[k + 1][cluster])
             features[k] = self.up[k](x, scale.graph)
         return features
+
+
+def linear_of_both(linear: nn.Module, a: Tensor, b: Tensor) -> Tensor:
+    """Return the linear map (V, C) of rows (V, A) and (V, B) side by side, without a table of both."""
+    assert isinstance(linear, nn.Linear)
+    of_a, of_b = torch.split(linear.weight, [a.shape[1], b.shape[1]], dim=1)
+    return nn.functional.linear(a, of_a, linear.bias).addmm_(b, of_b.T)
 
 
 def _pooled(x: Tensor, scale: Scale) -> Tensor:

@@ -14,7 +14,7 @@ from torch import Tensor, nn
 from anisomesh.errors import OptionError
 from anisomesh.learn.graph import Graph, graph_of
 from anisomesh.learn.messages import distance_of_neighbours, largest_of_neighbours
-from anisomesh.learn.network import Norm
+from anisomesh.learn.network import Norm, linear_of_both
 from anisomesh.surface.mesh import Surface
 
 INPUTS, OUTPUTS = 6, 5
@@ -83,8 +83,7 @@ class PaperConvolution(nn.Module):
         """Return (V, C) from (V, inputs)."""
         away = distance_of_neighbours(x, graph)
         largest = largest_of_neighbours(self.sent(x), self.away, graph, away) - self.own(x)
-        mixed: Tensor = self.out(torch.cat([x, largest], dim=1))
-        return mixed
+        return linear_of_both(self.out, x, largest)
 
 
 class PaperBlock(nn.Module):
@@ -101,8 +100,8 @@ class PaperBlock(nn.Module):
 
     def forward(self, x: Tensor, graph: Graph) -> Tensor:
         """Return (V, C) from (V, inputs)."""
-        inner = nn.functional.leaky_relu(self.norms[0](self.first(x, graph)), _SLOPE)
-        inner = nn.functional.leaky_relu(self.norms[1](self.second(inner, graph)), _SLOPE)
+        inner = nn.functional.leaky_relu(self.norms[0](self.first(x, graph)), _SLOPE, inplace=True)
+        inner = nn.functional.leaky_relu(self.norms[1](self.second(inner, graph)), _SLOPE, inplace=True)
         added: Tensor = self.skip(x) + inner
         return added
 

@@ -7,6 +7,7 @@ import numpy.typing as npt
 
 from anisomesh._arrays import Faces, Points
 from anisomesh._kernels import intersections as kernels
+from anisomesh._kernels.orientation import choose_axes
 from anisomesh.surface.geometry import unit
 from anisomesh.surface.mesh import Surface
 from anisomesh.surface.weld import coincident
@@ -50,7 +51,7 @@ def self_intersections(surface: Surface) -> Pairs:
     """
     points, faces = _welded(surface)
     axes = np.empty(len(faces), dtype=np.int8)
-    kernels.choose_axes(points, faces, axes)
+    choose_axes(points, faces, axes)
     with_area = np.flatnonzero(axes >= 0)
     if len(with_area) == 0:
         return np.empty((0, 2), dtype=np.int32)
