@@ -32,15 +32,10 @@ from anisomesh.surface.features import sharp_edges
 from anisomesh.surface.geometry import unit_frame
 from anisomesh.surface.mesh import Surface
 from anisomesh.surface.prepare import Prepared, prepare
-from anisomesh.surface.subdivide import Refined as Subdivided
-from anisomesh.surface.subdivide import split_long_edges
 from anisomesh.surface.tagged import edges_within, tagged_edges
+from anisomesh.surface.working import working_surface
 
 COUNT_TOLERANCE = 0.02  # share of the asked vertices by which the result may differ without a warning
-FINE_POINTS = 5_000  # the working surface has edges no longer than an even mesh of so many points
-EDGE_FACTOR = 1.6  # and no longer than this many distances between sites
-MAX_GROWTH = 8  # splitting makes at most so many times the faces, or MAX_SPLIT_FACES
-MAX_SPLIT_FACES = 60_000
 OPTIMISATION_SHARE = 0.6  # of the time limit is for all up to the end of the optimisation
 
 
@@ -134,7 +129,7 @@ def _remesh(
     with run.stage("prepare"):
         frame = unit_frame(prepared.surface.points)
         given = prepared.surface.with_points(frame.to_unit(prepared.surface.points))
-        split = _split(given, n)
+        split = working_surface(given, n)
         check_memory(n, split.surface.n_faces)
         if not isinstance(wanted, str):
             wanted = wanted * frame.scale**2
@@ -187,26 +182,12 @@ def _remesh(
     )
 
 
-def _split(surface: Surface, n: int) -> Subdivided:
-    """Return a surface with edges fine enough for n sites, or as fine as the bound on its faces allows."""
-    return split_long_edges(surface, max_edge(surface, n), max_faces=max(MAX_GROWTH * surface.n_faces, MAX_SPLIT_FACES))
-
-
 def _features(
     voronoi: RestrictedVoronoi, surface: Surface, n: int, tagged: EdgeMask, options: RemeshOptions
 ) -> Features:
     """Return boundary and creases; the plain CVT has none of the latter but those that are tagged."""
     angle = options.feature_angle if options.sharpness > 1.0 else 180.0
     return Features(voronoi, surface, n, sharp_edges(surface, angle) | tagged, tagged)
-
-
-def max_edge(surface: Surface, n_vertices: int) -> float:
-    """Return the edge length that the working surface may have, for this number of sites.
-
-    The embedding is linear on every facet, so facets must resolve both the distance between sites and, on
-    sparse input such as CAD, the change of the metric next to a crease.
-    """
-    return min(EDGE_FACTOR * _even_edge(surface.area, n_vertices), 2.0 * _even_edge(surface.area, FINE_POINTS))
 
 
 class _Run:
@@ -252,11 +233,6 @@ def _check_count(n_vertices: int | None, ratio: float | None, max_error: float |
         raise OptionError(f"n_vertices = {n_vertices}; expected a whole number of at least {MIN_VERTICES}")
     if ratio is not None and not (np.isfinite(ratio) and ratio > 0.0):
         raise OptionError(f"ratio = {ratio}; expected a positive number, such as 0.2 for a fifth of the vertices")
-
-
-def _even_edge(area: float, n: int) -> float:
-    """Return the edge length of n vertices spread evenly in equilateral triangles over an area."""
-    return float(np.sqrt(2.0 * area / (np.sqrt(3.0) * n)))
 
 
 def _at_prepared(tensors: npt.NDArray[Any], given: Surface, prepared: Prepared) -> npt.NDArray[np.float64]:

@@ -143,17 +143,17 @@ def test_wrong_folders_and_lists_are_refused(tmp_path):
 
 
 def test_the_command_builds_and_tells(run_cli, folder, tmp_path):
-    words = ("dataset", "build", folder, tmp_path / "out", "--target", 200, "--blobs", 1, "--no-variants")
+    words = ("dataset", "build", folder, tmp_path / "out", "--target", 200, "--blobs", 1, "--parts", 1, "--no-variants")
     done = run_cli(*words)
     assert done.returncode == 0, done.stderr
     assert "bad" in done.stderr
-    assert "[6/6]" in done.stderr
+    assert "[7/7]" in done.stderr
     info = run_cli("dataset", "info", tmp_path / "out")
     assert info.returncode == 0
     assert info.stdout.startswith(done.stdout.rstrip("\n"))
     assert "failed   bad" in info.stdout
     rows = [json.loads(line) for line in (tmp_path / "out" / MANIFEST).read_text().splitlines()]
-    assert len(rows) == 6
+    assert len(rows) == 7
     for words, code in ((("info", tmp_path), 1), (("build", tmp_path / "no", tmp_path / "x"), 1)):
         done = run_cli("dataset", *words)
         assert done.returncode == code

@@ -31,9 +31,8 @@ from anisomesh.learn.run import CHECKPOINT, EVENTS, METRICS, WEIGHTS, DivergedEr
 from anisomesh.learn.shipped import weights_path  # noqa: E402
 from anisomesh.learn.tasks import StretchTask  # noqa: E402
 from anisomesh.learn.train import train  # noqa: E402
-from anisomesh.pipeline import max_edge  # noqa: E402
 from anisomesh.surface.geometry import unit_frame  # noqa: E402
-from anisomesh.surface.subdivide import split_long_edges  # noqa: E402
+from anisomesh.surface.working import working_surface  # noqa: E402
 
 PAPER = PaperOptions(channels=8, levels=2)
 NETWORK = NetworkOptions(channels=16, scales=3, blocks=1, heads=2)
@@ -341,7 +340,7 @@ def test_a_remesh_takes_the_metric_of_a_trained_network(files, tmp_path, run_cli
     result = anisomesh.remesh(surface, n_vertices=150, embedding="neural", weights=weights, max_iterations=20)
     assert result.surface.n_points == 150
     unit = surface.with_points(unit_frame(surface.points).to_unit(surface.points))
-    found = predict(split_long_edges(unit, max_edge(unit, 150), max_faces=60_000).surface, weights)
+    found = predict(working_surface(unit, 150).surface, weights)
     np.testing.assert_allclose(result.working.points, found.points, atol=1e-6)
     stretch = np.sqrt(np.linalg.eigvalsh(found.tensors)[:, 2])
     assert stretch.mean() > 1.1

@@ -9,7 +9,8 @@ from anisomesh.dataset.make import Recipe, UnsuitableError, evened, items_of_blo
 from anisomesh.errors import MeshFileError, OptionError
 from anisomesh.evaluation.distance import surface_distance
 from anisomesh.learn.items import Item, load_item, save_item
-from anisomesh.metric.tensor import validate_metric
+from anisomesh.metric.curvature import principal_curvatures
+from anisomesh.metric.tensor import curvature_metric, validate_metric
 from anisomesh.surface.geometry import thickness
 from anisomesh.surface.shapes import box, ellipsoid, sphere, torus
 
@@ -60,6 +61,29 @@ def test_damaged_files_are_refused(tmp_path, damage):
         path.write_bytes({"cut": data[: len(data) // 2], "empty": b"", "text": b"hello"}[damage])
     with pytest.raises(MeshFileError, match=r"a\.npz"):
         load_item(path)
+
+
+def test_a_given_mesh_is_an_item_with_the_metric_measured_on_it():
+    surface = ellipsoid((1.0, 0.5, 0.3), 4)  # 2,562 points
+    recipe = Recipe(target=1_500, variants=("given",))
+    made = items_of_mesh(surface, recipe, np.random.default_rng(0))
+    assert [entry.kind for entry in made] == ["even", "given"]
+    item = made[1].item
+    unit = surface.points / surface.diagonal
+    np.testing.assert_allclose(np.linalg.norm(np.ptp(item.points, axis=0)), 1.0, atol=1e-6)
+    offset = item.points[: len(unit)] - unit
+    np.testing.assert_allclose(offset, np.broadcast_to(offset.mean(axis=0), offset.shape), atol=1e-6)
+    wanted = curvature_metric(item.surface, principal_curvatures(item.surface))
+    np.testing.assert_allclose(item.tensors, wanted, rtol=1e-3, atol=1e-3)
+
+
+@pytest.mark.parametrize("reason", ["needles", "many points", "even as it is"])
+def test_a_given_mesh_is_no_item_if_nothing_is_to_be_learnt_from_it(reason):
+    surface = ellipsoid((1.0, 0.5, 0.3), 3)
+    recipe = Recipe(target=100 if reason == "many points" else 600, variants=("given",))
+    if reason == "needles":
+        surface = torus(1.0, 0.3, 120, 6)
+    assert [entry.kind for entry in items_of_mesh(surface, recipe, np.random.default_rng(0))] == ["even"]
 
 
 def test_the_items_of_a_mesh_are_its_even_mesh_and_the_variants(made):

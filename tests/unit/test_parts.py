@@ -3,10 +3,12 @@
 import numpy as np
 import pytest
 
+from anisomesh.dataset.lofts import random_part
 from anisomesh.errors import OptionError
 from anisomesh.surface import topology
 from anisomesh.surface.features import corners, sharp_edges
-from anisomesh.surface.parts import prism, revolution, sparse_parts
+from anisomesh.surface.intersections import self_intersections
+from anisomesh.surface.parts import hollow_loft, loft, prism, revolution, sparse_parts
 
 CORNERS = {"cube": 8, "slab": 8, "rod": 8, "bracket": 12, "channel": 16, "stairs": 20, "hexagon": 12, "gear": 24}
 
@@ -54,6 +56,42 @@ def test_a_solid_of_revolution_has_the_volume_of_its_frustums():
     assert volume(revolution(profile, n)) == pytest.approx(share * ((w - z) * (a * a + a * b + b * b) / 3).sum())
 
 
+def star(n=5, seed=0):
+    turn = 2 * np.pi * np.arange(2 * n) / (2 * n)
+    radius = np.random.default_rng(seed).uniform(0.3, 1.0, (2 * n, 1))
+    return radius * np.stack([np.cos(turn), np.sin(turn)], axis=1)
+
+
+def test_a_loft_has_the_volume_of_its_frustums():
+    profile = np.array([[0.0, 0.0], [1.0, 0.2], [0.5, 1.0], [0.8, 1.5], [0.0, 2.0]])
+    (a, z), (b, w) = profile[:-1].T, profile[1:].T
+    wanted = shoelace(star()) * ((w - z) * (a * a + a * b + b * b) / 3).sum()
+    assert volume(loft(star(), profile)) == pytest.approx(wanted)
+
+
+def test_a_hollow_loft_is_the_loft_less_its_hole():
+    around = loft(star(), [[0, 0], [1, 0], [1, 2], [0, 2]])
+    hole = loft(star(), [[0, 0], [0.5, 0], [0.7, 2], [0, 2]])
+    part = hollow_loft(star(), [[1, 0], [1, 2], [0.7, 2], [0.5, 0]])
+    assert volume(part) == pytest.approx(volume(around) - volume(hole))
+    assert (part.edge_face_count == 2).all()
+    assert topology.euler_characteristic(part.faces) == 0
+
+
+def test_random_parts_are_closed_solids_that_depend_on_the_numbers_alone():
+    kinds = set()
+    for seed in range(40):
+        part = random_part(np.random.default_rng(seed))
+        assert (part.edge_face_count == 2).all()
+        assert topology.is_oriented(part.faces)
+        assert len(self_intersections(part)) == 0
+        assert part.face_areas.min() > 0.0
+        assert volume(part) > 0.0
+        kinds.add(topology.euler_characteristic(part.faces))
+    assert kinds == {0, 2}
+    np.testing.assert_array_equal(random_part(np.random.default_rng(39)).points, part.points)
+
+
 @pytest.mark.parametrize(
     "make",
     [
@@ -64,6 +102,10 @@ def test_a_solid_of_revolution_has_the_volume_of_its_frustums():
         lambda: revolution([[0.1, 0], [1, 1], [0, 2]]),
         lambda: revolution([[0, 0], [0, 1], [0, 2]]),
         lambda: revolution([[0, 0], [1, 1], [0, 2]], 2),
+        lambda: loft([[0, 1], [1, 1], [1, 2], [0, 2]], [[0, 0], [1, 0], [0, 1]]),  # the origin is outside
+        lambda: loft([[1, 0], [0, -1], [-1, 0], [0, 1]], [[0, 0], [1, 0], [0, 1]]),  # clockwise
+        lambda: hollow_loft(star(), [[1, 0], [0.5, 0], [0.5, 1], [1, 1]]),  # clockwise
+        lambda: hollow_loft(star(), [[1, 0], [1, 1], [0, 0]]),  # touches the axis
     ],
 )
 def test_outlines_that_make_no_solid_are_refused(make):

@@ -17,6 +17,14 @@ if TYPE_CHECKING:
     from anisomesh.learn.manifest import Row
 
 
+class Variant(StrEnum):
+    """Other meshes of a shape."""
+
+    given = "given"
+    decimated = "decimated"
+    stretched = "stretched"
+
+
 class Evening(StrEnum):
     """How meshes are made even."""
 
@@ -32,8 +40,12 @@ def build_command(
     source: Annotated[Path, typer.Argument(metavar="SRC", help="Folder of meshes.")],
     out: Annotated[Path, typer.Argument(metavar="OUT", help="Folder of the data set; made if it is not there.")],
     target: Annotated[int, typer.Option(min=100, help="Points of the even mesh of a shape.")] = 5_000,
-    blobs: Annotated[int, typer.Option(min=0, help="Shapes made by code, with exact curvature, besides.")] = 40,
-    variants: Annotated[bool, typer.Option(help="Badly triangulated meshes of every shape as well.")] = True,
+    blobs: Annotated[int, typer.Option(min=0, help="Smooth shapes made by code, with exact curvature, besides.")] = 40,
+    parts: Annotated[int, typer.Option(min=0, help="Machine parts made by code besides.")] = 40,
+    variant: Annotated[
+        list[Variant], typer.Option(help="Meshes of every shape beside the even one; may be given again.")
+    ] = list(Variant),  # noqa: B006  (typer copies it)
+    no_variants: Annotated[bool, typer.Option("--no-variants", help="Even meshes only.")] = False,
     evening: Annotated[
         Evening, typer.Option(help="cvt: a uniform remesh; tetwild: pytetwild before it.")
     ] = Evening.cvt,
@@ -43,10 +55,11 @@ def build_command(
 ) -> None:
     """Make training items of the meshes of SRC in OUT; a build that was stopped goes on where it was."""
     from anisomesh.dataset.build import build, sources_of
-    from anisomesh.dataset.make import VARIANTS, Recipe
+    from anisomesh.dataset.make import Recipe
 
-    recipe = Recipe(target=target, variants=VARIANTS if variants else (), evening=evening.value)
-    sources = sources_of(source, blobs)
+    variants = () if no_variants else tuple(kind.value for kind in Variant if kind in variant)
+    recipe = Recipe(target=target, variants=variants, evening=evening.value)
+    sources = sources_of(source, blobs, parts)
     with progress(quiet) as display:
         announce_compilation(display, "remesh")
     on_row = _ignore if quiet else _print

@@ -9,10 +9,12 @@ from collections.abc import Callable, Iterator
 from concurrent.futures import FIRST_COMPLETED, Future, ThreadPoolExecutor, wait
 from dataclasses import asdict, dataclass
 from pathlib import Path
+from typing import Literal
 
 import numpy as np
 
 from anisomesh.dataset.implicit import Blobs
+from anisomesh.dataset.lofts import random_part
 from anisomesh.dataset.make import Made, Recipe, UnsuitableError, items_of_blobs, items_of_mesh, require_packages
 from anisomesh.errors import AnisomeshError, OptionError
 from anisomesh.isolation import isolated
@@ -35,15 +37,18 @@ class Source:
     family
         Shapes of one family (near-duplicates) are either all for training or all for validation.
     path
-        The mesh file, None for blobs made by code.
+        The mesh file, None for a shape made by code.
     seed
-        Of the blobs and of the variants.
+        Of the shape made by code and of the variants.
+    kind
+        Where the shape is from.
     """
 
     name: str
     family: str
     path: Path | None
     seed: int
+    kind: Literal["mesh", "blobs", "part"] = "mesh"
 
     def fingerprint(self, recipe: Recipe) -> str:
         """Return a number that changes with the file, the seed and the recipe."""
@@ -52,7 +57,7 @@ class Source:
         return hashlib.sha256(text + content).hexdigest()[:16]
 
 
-def sources_of(folder: Path | None, n_blobs: int) -> list[Source]:
+def sources_of(folder: Path | None, n_blobs: int, n_parts: int = 0) -> list[Source]:
     """Return the meshes of a folder and of those below it, and so many shapes made by code.
 
     Parameters
@@ -60,8 +65,8 @@ def sources_of(folder: Path | None, n_blobs: int) -> list[Source]:
     folder
         Its families are read from ``manifest.csv`` (columns ``file``, ``family``) there or one folder up, if there is
         one; else every mesh is its own family. None for no meshes.
-    n_blobs
-        Number of shapes made by code.
+    n_blobs, n_parts
+        Numbers of smooth shapes and of machine parts made by code.
 
     Raises
     ------
@@ -76,9 +81,11 @@ def sources_of(folder: Path | None, n_blobs: int) -> list[Source]:
         for path in sorted(p for p in folder.rglob("*") if p.suffix.lower() in FORMATS and p.is_file()):
             name = "-".join(path.relative_to(folder).with_suffix("").parts)
             found.append(Source(name=name, family=families.get(path.resolve(), name), path=path, seed=_number(name)))
-    for number in range(n_blobs):
-        name = f"blobs-{number:04d}"
-        found.append(Source(name=name, family=name, path=None, seed=_number(name)))
+    kinds: tuple[tuple[Literal["blobs", "part"], int], ...] = (("blobs", n_blobs), ("part", n_parts))
+    for kind, count in kinds:
+        for number in range(count):
+            name = f"{kind}-{number:04d}"
+            found.append(Source(name=name, family=name, path=None, seed=_number(name), kind=kind))
     if not found:
         raise OptionError(
             f"{folder} has no mesh in one of {', '.join(sorted(FORMATS))}, and no shapes by code are asked for"
@@ -208,10 +215,10 @@ def make(source: Source, out: Path, recipe: Recipe) -> Row:
     """Make and write the items of a source; return the part of its row that says so."""
     rng = np.random.default_rng(source.seed)
     made: list[Made]
-    if source.path is None:
+    if source.kind == "blobs":
         made = items_of_blobs(Blobs.random(rng), recipe, rng)
     else:
-        made = items_of_mesh(load(source.path), recipe, rng)
+        made = items_of_mesh(random_part(rng) if source.path is None else load(source.path), recipe, rng)
     items = []
     for entry in made:
         name = f"{source.name}.{entry.kind}.npz"

@@ -26,12 +26,16 @@ from anisomesh.surface.closest import ClosestPoints
 from anisomesh.surface.geometry import Frame, thickness, unit_frame
 from anisomesh.surface.mesh import Surface
 from anisomesh.surface.prepare import prepare
+from anisomesh.surface.working import working_surface
 
-VARIANTS = ("decimated", "stretched")
+VARIANTS = ("given", "decimated", "stretched")
 _REGULAR = 0.4330127  # thickness of an equilateral triangle
 _COUNTS = (0.6, 1.6)  # of the wanted number of points that a mesh may have without being made anew
 _EVEN = 0.7  # mean thickness, as a share of the regular one, from which on a mesh is even
 _DECIMATED, _STRETCHED = (0.35, 0.75), (0.5, 1.0)  # of the points that such variants have
+_GIVEN = 0.5  # mean thickness, as such a share, from which on the curvature of a mesh as it is given is worth learning
+_MOST_GIVEN = 4  # times the wanted number of points that such a mesh may have
+_SITES = (0.2, 1.0)  # of its points: the numbers of sites that its working surface is for
 _SECONDS = 120.0  # for a remesh
 
 MetricOn = Callable[[Surface], tuple[PointTensors, PointMask]]
@@ -46,8 +50,9 @@ class Recipe:
     target
         Points that the even mesh of a shape has, about.
     variants
-        Other meshes of every shape: ``"decimated"`` (quadric collapses: irregular triangles) and ``"stretched"``
-        (triangles stretched in a random direction that has nothing to do with the curvature).
+        Other meshes of every shape: ``"given"`` (the one that it came with, as a remesh works on it, if its triangles
+        are good enough), ``"decimated"`` (quadric collapses: irregular triangles) and ``"stretched"`` (triangles
+        stretched in a random direction that has nothing to do with the curvature).
     evening
         How meshes with other numbers of points, or with bad triangles, are made even: ``"cvt"``, our own remesh with a
         uniform metric, or ``"tetwild"``, the boundary of pytetwild's tetrahedra, as in the paper, and then the same.
@@ -117,9 +122,12 @@ def items_of_mesh(surface: Surface, recipe: Recipe, rng: np.random.Generator) ->
     Notes
     -----
     The targets of variants are the metric of the even mesh, from the closest point: a network that sees a bad
-    triangulation is to find what a good one shows.
+    triangulation is to find what a good one shows. That of the given mesh is its own metric, which depends on its
+    triangles: the fit of curvature is over rings of edges.
     """
-    clean = evened(prepare(surface).surface, recipe)
+    given = prepare(surface).surface
+    clean = evened(given, recipe)
+    is_even = clean is given
     clean = clean.with_points(unit_frame(clean.points).to_unit(clean.points))
     curvature = principal_curvatures(clean)
     reference, roots = ClosestPoints(clean), metric_root(curvature_metric(clean, curvature))
@@ -130,7 +138,10 @@ def items_of_mesh(surface: Surface, recipe: Recipe, rng: np.random.Generator) ->
         found = transfer_metric_roots(reference, roots, mesh.points)
         return found @ found, np.asarray(curvature.trusted[nearest])
 
-    return _items(clean, metric_on, lambda points: points, recipe, rng)
+    made = _items(clean, metric_on, lambda points: points, recipe, rng)
+    if "given" in recipe.variants and not is_even:
+        made += _given(given, recipe, rng)
+    return made
 
 
 def items_of_blobs(blobs: Blobs, recipe: Recipe, rng: np.random.Generator) -> list[Made]:
@@ -153,9 +164,8 @@ def items_of_blobs(blobs: Blobs, recipe: Recipe, rng: np.random.Generator) -> li
 
 def evened(surface: Surface, recipe: Recipe) -> Surface:
     """Return a mesh of about the wanted number of even triangles: the same one, if it is like that."""
-    shape = thickness(surface.points[surface.faces]) / _REGULAR
     low, high = (share * recipe.target for share in _COUNTS)
-    if low <= surface.n_points <= high and shape.mean() >= _EVEN:
+    if low <= surface.n_points <= high and _regularity(surface) >= _EVEN:
         return surface
     if recipe.evening == "tetwild":
         require_packages(recipe)
@@ -176,7 +186,7 @@ def _items(
     if stretch < recipe.min_stretch:
         raise UnsuitableError(f"flat or round everywhere: the mean stretch is {stretch:.3f}")
     makers = {"decimated": _decimated, "stretched": _stretched}
-    meshes = {kind: makers[kind](clean, rng) for kind in recipe.variants}
+    meshes = {kind: makers[kind](clean, rng) for kind in recipe.variants if kind in makers}
     variants = {kind: mesh.with_points(settle(mesh.points)) for kind, mesh in meshes.items()}
     return [even, *(_made(kind, mesh, metric_on, recipe) for kind, mesh in variants.items())]
 
@@ -192,6 +202,25 @@ def _made(kind: str, mesh: Surface, metric_on: MetricOn, recipe: Recipe) -> Made
         "trusted": round(float(trusted.mean()), 4),
     }
     return Made(kind=kind, item=Item.of(mesh, tensors, embedding.points[:, 3:], trusted), facts=facts)
+
+
+def _given(surface: Surface, recipe: Recipe, rng: np.random.Generator) -> list[Made]:
+    """Return the item of a mesh as it is given, with the curvature measured on it; none if it is not worth learning."""
+    if _regularity(surface) < _GIVEN:
+        return []
+    surface = surface.with_points(unit_frame(surface.points).to_unit(surface.points))
+    n_sites = round(surface.n_points * np.exp(rng.uniform(*np.log(_SITES))))
+    working = working_surface(surface, n_sites).surface
+    if working.n_points > _MOST_GIVEN * recipe.target:
+        return []
+    curvature = principal_curvatures(working)
+    made = _made("given", working, lambda mesh: (curvature_metric(mesh, curvature), curvature.trusted), recipe)
+    return [made] if made.facts["residual"] <= recipe.max_residual else []
+
+
+def _regularity(surface: Surface) -> float:
+    """Return the mean thickness of the triangles as a share of that of regular ones."""
+    return float(thickness(surface.points[surface.faces]).mean()) / _REGULAR
 
 
 def _decimated(clean: Surface, rng: np.random.Generator) -> Surface:

@@ -1,4 +1,4 @@
-"""Sparse CAD parts made by code: prisms, solids of revolution, and a set of them, with few large triangles."""
+"""Sparse CAD parts made by code: prisms, solids of revolution, lofts, and a set of them, with few large triangles."""
 
 from __future__ import annotations
 
@@ -43,15 +43,31 @@ def revolution(profile: Sequence[Sequence[float]] | Outline, n_around: int = 32)
     OptionError
         If the profile does not begin and end on the axis, or touches it between.
     """
-    rows = np.asarray(profile, dtype=np.float64)
-    if rows.ndim != 2 or rows.shape[1] != 2 or len(rows) < 3 or n_around < 3:
-        raise OptionError(
-            f"profile has shape {rows.shape}, n_around is {n_around}; expected (n, 2) from 3, and 3 or more"
-        )
+    if n_around < 3:
+        raise OptionError(f"n_around is {n_around}; expected 3 or more")
+    return loft(patches.circle(1.0, n_around), profile)
+
+
+def loft(outline: Sequence[Sequence[float]] | Outline, profile: Sequence[Sequence[float]] | Outline) -> Surface:
+    """Return the solid whose sections are an outline, as many times larger as a profile says.
+
+    Parameters
+    ----------
+    outline
+        Polygon (m, 2) that goes around the origin counter-clockwise and is seen from it all round.
+    profile
+        Sizes and heights (n, 2), from size 0 to size 0.
+
+    Raises
+    ------
+    OptionError
+        If the outline is no such polygon, or the profile does not begin and end on the axis, or touches it between.
+    """
+    rim, rows = _checked(outline, profile)
     if rows[0, 0] != 0.0 or rows[-1, 0] != 0.0 or not (rows[1:-1, 0] > 0.0).all():
         raise OptionError("the profile has to begin and end on the axis (radius 0) and be off it between")
-    rim = patches.circle(1.0, n_around)
-    rings = [np.pad(radius * rim, ((0, 0), (0, 1)), constant_values=z) for radius, z in rows[1:-1]]
+    n_around = len(rim)
+    rings = _rings(rim, rows[1:-1])
     ends = np.array([[0.0, 0.0, rows[0, 1]], [0.0, 0.0, rows[-1, 1]]])
     wall = patches.grid_faces(len(rings), n_around, wrap_columns=True)[:, ::-1] if len(rings) > 1 else np.zeros((0, 3))
     first, last = len(rings) * n_around, len(rings) * n_around + 1
@@ -62,6 +78,54 @@ def revolution(profile: Sequence[Sequence[float]] | Outline, n_around: int = 32)
         np.stack([np.full(n_around, last), top + k, top + after], axis=1),
     ]
     return Surface(np.concatenate([*rings, ends]), np.concatenate([wall, *fans]).astype(np.int64))
+
+
+def hollow_loft(outline: Sequence[Sequence[float]] | Outline, section: Sequence[Sequence[float]] | Outline) -> Surface:
+    """Return a loft with a hole along its axis: the surface of outlines as large and high as a closed polygon says.
+
+    Parameters
+    ----------
+    outline
+        As in :func:`loft`.
+    section
+        Simple polygon (n, 2) of sizes, which are positive, and heights, counter-clockwise: up outside, down inside.
+
+    Raises
+    ------
+    OptionError
+        If the outline is no such polygon, or the section has a size that is not positive, or is not counter-clockwise.
+    """
+    rim, rows = _checked(outline, section)
+    after = np.roll(rows, -1, axis=0)
+    if not (rows[:, 0] > 0.0).all() or not (rows[:, 0] * after[:, 1] - rows[:, 1] * after[:, 0]).sum() > 0.0:
+        raise OptionError("the section has to be counter-clockwise and off the axis")
+    wall = patches.grid_faces(len(rows), len(rim), wrap_rows=True, wrap_columns=True)[:, ::-1]
+    return Surface(np.concatenate(_rings(rim, rows)), wall.astype(np.int64))
+
+
+def _checked(
+    outline: Sequence[Sequence[float]] | Outline, profile: Sequence[Sequence[float]] | Outline
+) -> tuple[Outline, Outline]:
+    """Return an outline and a profile as arrays of the shapes that a loft needs."""
+    rim, rows = np.asarray(outline, dtype=np.float64), np.asarray(profile, dtype=np.float64)
+    if rim.ndim != 2 or rim.shape[1] != 2 or len(rim) < 3 or not is_star(rim):
+        raise OptionError(f"outline of shape {rim.shape}; expected (m, 2), counter-clockwise and seen from the origin")
+    if rows.ndim != 2 or rows.shape[1] != 2 or len(rows) < 3:
+        raise OptionError(f"profile has shape {rows.shape}; expected (n, 2) from 3")
+    return rim, rows
+
+
+def _rings(rim: Outline, rows: Outline) -> list[Outline]:
+    """Return the sections (m, 3) of a loft."""
+    return [np.pad(size * rim, ((0, 0), (0, 1)), constant_values=z) for size, z in rows]
+
+
+def is_star(outline: Outline) -> bool:
+    """Return whether a polygon (m, 2) goes around the origin once, counter-clockwise, and is seen from it all round."""
+    after = np.roll(outline, -1, axis=0)
+    cross = outline[:, 0] * after[:, 1] - outline[:, 1] * after[:, 0]
+    turn = np.arctan2(cross, np.einsum("nx,nx->n", outline, after))
+    return bool((cross > 0.0).all() and abs(turn.sum() - 2.0 * np.pi) < 1.0)
 
 
 def sparse_parts() -> dict[str, Surface]:
