@@ -125,3 +125,26 @@ def test_the_mesh_does_not_leave_the_surface():
     assert (result.faces != coarse.faces).any()
     assert middles(result).mean() <= 1.05 * middles(coarse).mean()
     assert not reference.turned(result.points[result.faces]).any()
+
+
+@pytest.mark.parametrize("height", [0.0, 1e-16, -1e-16])
+def test_a_triangle_without_area_on_a_straight_boundary_is_flipped_away(height):
+    points = np.array([[0.0, 0.0, 0.0], [0.5, height, 0.0], [1.0, 0.0, 0.0], [0.5, 0.8, 0.0]])
+    faces = np.array([[0, 1, 2], [0, 2, 3]], dtype=np.int32)
+    plane = open_patch(lambda x, y: 0.0 * x, n=4)
+    changed = flip_for_shape(points, faces, identity(4), ClosestPoints(plane))
+    surface = Surface(points, changed)
+    assert surface.face_areas.min() == pytest.approx(0.2)
+    np.testing.assert_allclose(surface.face_normals, np.tile([0.0, 0.0, 1.0], (2, 1)), atol=1e-12)
+
+
+def test_a_fan_of_triangles_without_area_is_flipped_away():
+    along = np.linspace(0.0, 1.0, 6)
+    points = np.concatenate([np.stack([along, 0.7 * along, 0.0 * along], axis=1), [[0.9, -0.5, 0.0]]])
+    fan = [[0, k + 1, k] for k in range(1, 5)]  # collinear but for rounding
+    faces = np.array([*fan, [0, 6, 5]], dtype=np.int32)
+    plane = open_patch(lambda x, y: 0.0 * x, n=4)
+    changed = flip_for_shape(points, faces, identity(7), ClosestPoints(plane))
+    surface = Surface(points, changed)
+    assert surface.face_areas.min() > 0.01
+    np.testing.assert_allclose(surface.face_normals, np.tile(surface.face_normals[0], (5, 1)), atol=1e-12)

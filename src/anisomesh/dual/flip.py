@@ -18,6 +18,9 @@ _MAX_ROUNDS = 20
 _MIN_GAIN = 1e-3  # of the sum of the qualities of the two triangles
 _MAX_TURN = 30.0  # degrees between the normals of the triangles before and after
 _SLACK = 0.01  # edge lengths by which the new edge may be farther from the surface than the old one
+_FLAT = 1e-8  # thickness below which a triangle has no area, and rounding decides where it faces
+_FLAT_QUALITY = -2.0  # of such a triangle: no gain elsewhere makes up for one
+_FLAT_SLACK = 0.05  # the same as the other slack, to be rid of one
 
 Ints = npt.NDArray[np.int64]
 
@@ -99,7 +102,8 @@ def flip_for_shape(
     The dual of a Voronoi diagram has the best triangles for the metric that the embedding has, which is not quite the
     one asked for. A flip is made if the qualities G of the two triangles have a larger sum after it, unless it makes a
     fold or a triangle that faces away, or takes the middle of the edge farther from the surface, as a flip over a
-    crease does. The sum over the mesh grows with every flip, so the rounds end.
+    crease does. Triangles without area, as between three vertices on a straight boundary, go first: they count less
+    than nothing, and cannot be folded. The sum over the mesh grows with every flip, so the rounds end.
     """
     active = np.ones(len(faces), dtype=bool)
     keys = edge_keys(np.zeros((0, 2), dtype=np.int64) if kept is None else kept)
@@ -109,7 +113,7 @@ def flip_for_shape(
         edges = edges[~np.isin(edge_keys(surface.edges[edges]), keys)]
         flips = possible_flips(surface, edges)
         before, after = (
-            anisotropic_quality(points, triangles.reshape(-1, 3), roots).reshape(-1, 2).sum(axis=1)
+            _quality(points, triangles.reshape(-1, 3), roots).reshape(-1, 2).sum(axis=1)
             for triangles in (faces[flips.pair], flips.triangles)
         )
         gain = after - before
@@ -124,17 +128,32 @@ def flip_for_shape(
     return faces
 
 
+def _is_flat(points: Points, triangles: Ints) -> npt.NDArray[np.bool_]:
+    """Return which triangles (n, 3) have no area to speak of."""
+    return np.asarray(geometry.thickness(points[triangles]) < _FLAT)
+
+
+def _quality(points: Points, triangles: Ints, roots: PointTensors) -> npt.NDArray[np.float64]:
+    """Return the qualities of triangles (n, 3) in the metric."""
+    return np.where(_is_flat(points, triangles), _FLAT_QUALITY, anisotropic_quality(points, triangles, roots))
+
+
 def _keeps_surface(surface: Surface, flips: Flips, reference: ClosestPoints) -> npt.NDArray[np.bool_]:
     """Return which flips (n,) keep the normals and do not take the mesh away from the reference."""
     points = surface.points
     normals = geometry.unit(geometry.face_cross(points, flips.triangles.reshape(-1, 3))).reshape(-1, 2, 3)
     cosine = np.einsum("nix,njx->nij", normals, surface.face_normals[flips.pair])
+    flat = _is_flat(points, surface.faces[flips.pair].reshape(-1, 3)).reshape(-1, 1, 2)
+    cosine[np.broadcast_to(flat, cosine.shape)] = 1.0
     allowed = np.asarray(cosine.min(axis=(1, 2)) > np.cos(np.radians(_MAX_TURN)))
     some = flips.take(allowed)
     old_distance, new_distance = (
         np.sqrt(reference.squared_distances(points[ends].mean(axis=1))) for ends in (some.old, some.new)
     )
-    length = np.linalg.norm(points[some.old[:, 1]] - points[some.old[:, 0]], axis=1)
+    old_length, new_length = (
+        np.linalg.norm(points[ends[:, 1]] - points[ends[:, 0]], axis=1) for ends in (some.old, some.new)
+    )
+    slack = np.where(np.asarray(flat.any(axis=(1, 2)))[allowed], _FLAT_SLACK * new_length, _SLACK * old_length)
     facing = reference.clearly_facing(points[some.triangles.reshape(-1, 3)]).reshape(-1, 2).all(axis=1)
-    allowed[allowed] = (new_distance <= old_distance + _SLACK * length) & facing
+    allowed[allowed] = (new_distance <= old_distance + slack) & facing
     return allowed
