@@ -21,7 +21,7 @@ def random_part(rng: np.random.Generator) -> Surface:
     """Return a random loft, stretched along its axes and turned: a closed surface of large flat and curved triangles.
 
     Its sections are polygons, gears or circles; its profile goes up in cylinders, cones and bulges, with steps between
-    them. Corners of both are sharp, bevelled or rounded.
+    them. Corners of both are sharp, bevelled or rounded. Some parts have a hole along their axis.
     """
     outline = _outline(rng)
     while not is_star(outline):
