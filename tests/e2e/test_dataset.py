@@ -11,8 +11,9 @@ import numpy as np
 import pytest
 
 import anisomesh
+from anisomesh.cli.dataset import Variant
 from anisomesh.dataset.build import build, sources_of
-from anisomesh.dataset.make import Recipe
+from anisomesh.dataset.make import VARIANTS, Recipe
 from anisomesh.errors import MeshFileError, OptionError
 from anisomesh.learn.items import load_item
 from anisomesh.learn.manifest import MANIFEST, files_of, read_manifest
@@ -158,3 +159,7 @@ def test_the_command_builds_and_tells(run_cli, folder, tmp_path):
         done = run_cli("dataset", *words)
         assert done.returncode == code
         assert len(done.stderr.strip().splitlines()) == 1
+
+
+def test_the_command_has_the_variants_of_a_recipe():
+    assert tuple(kind.value for kind in Variant) == VARIANTS
