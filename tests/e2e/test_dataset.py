@@ -161,5 +161,12 @@ def test_the_command_builds_and_tells(run_cli, folder, tmp_path):
         assert len(done.stderr.strip().splitlines()) == 1
 
 
+def test_variants_and_no_variants_exclude_each_other(run_cli, folder, tmp_path):
+    done = run_cli("dataset", "build", folder, tmp_path / "out", "--variant", "given", "--no-variants")
+    assert done.returncode == 2
+    assert "either --variant or --no-variants" in done.stderr
+    assert not (tmp_path / "out").exists()
+
+
 def test_the_command_has_the_variants_of_a_recipe():
     assert tuple(kind.value for kind in Variant) == VARIANTS

@@ -43,8 +43,9 @@ def build_command(
     blobs: Annotated[int, typer.Option(min=0, help="Smooth shapes made by code, with exact curvature, besides.")] = 40,
     parts: Annotated[int, typer.Option(min=0, help="Machine parts made by code besides.")] = 40,
     variant: Annotated[
-        list[Variant], typer.Option(help="Meshes of every shape beside the even one; may be given again.")
-    ] = list(Variant),  # noqa: B006  (typer copies it)
+        list[Variant] | None,
+        typer.Option(help="Meshes of every shape beside the even one; may be given again.", show_default="all"),
+    ] = None,
     no_variants: Annotated[bool, typer.Option("--no-variants", help="Even meshes only.")] = False,
     evening: Annotated[
         Evening, typer.Option(help="cvt: a uniform remesh; tetwild: pytetwild before it.")
@@ -57,7 +58,9 @@ def build_command(
     from anisomesh.dataset.build import build, sources_of
     from anisomesh.dataset.make import Recipe
 
-    variants = () if no_variants else tuple(kind.value for kind in Variant if kind in variant)
+    if no_variants and variant:
+        raise typer.BadParameter("give either --variant or --no-variants")
+    variants = () if no_variants else tuple(kind.value for kind in Variant if kind in (variant or Variant))
     recipe = Recipe(target=target, variants=variants, evening=evening.value)
     sources = sources_of(source, blobs, parts)
     with progress(quiet) as display:

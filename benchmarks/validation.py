@@ -1,0 +1,65 @@
+"""How far the metric of a network is from the one wanted, on items of a data set that it was not trained with.
+
+Usage: python benchmarks/validation.py ITEMS [WEIGHTS ...]
+
+ITEMS is a folder made by ``anisomesh dataset build``; WEIGHTS are files, or names of networks of the package. Of every
+validation item, without noise: the Frobenius norm of the difference of the logarithms of the two metrics, mean over the
+surface where the curvature is trusted, over that of predicting no stretch. A row is the mean over items of one kind of
+mesh, designed shapes (where many edges are flat, as on machine parts) apart from others.
+"""
+
+from __future__ import annotations
+
+import argparse
+import os
+from collections import defaultdict
+from pathlib import Path
+
+import numpy as np
+import numpy.typing as npt
+
+from anisomesh.estimate import DESIGNED
+from anisomesh.learn.items import Item, load_item
+from anisomesh.learn.manifest import files_of
+from anisomesh.learn.predict import predict
+from anisomesh.learn.shipped import shipped_weights
+from anisomesh.surface.features import share_of_flat_edges
+from anisomesh.surface.geometry import sums_at_points
+
+
+def logarithm(tensors: npt.NDArray[np.float64]) -> npt.NDArray[np.float64]:
+    values, vectors = np.linalg.eigh(tensors)
+    return np.asarray((vectors * np.log(values)[:, None, :]) @ vectors.transpose(0, 2, 1))
+
+
+def error(item: Item, weights: str) -> float:
+    """Return the error of the metric predicted, over that of predicting no stretch."""
+    surface, wanted = item.surface, logarithm(item.tensors)
+    found = logarithm(predict(surface, weights, denoise=False).tensors)
+    area = sums_at_points(surface.face_areas, surface.faces, surface.n_points) * item.trusted
+    off, all_of_it = (area @ np.linalg.norm(each, axis=(1, 2)) for each in (found - wanted, wanted))
+    return float(off / all_of_it)
+
+
+def main() -> None:
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("items", type=Path)
+    parser.add_argument("weights", nargs="*", default=list(shipped_weights()))
+    asked = parser.parse_args()
+    groups: dict[tuple[str, str], list[Item]] = defaultdict(list)
+    paths = files_of(asked.items).validation
+    for path in paths:
+        name, kind = path.stem.rsplit(".", 1)
+        even = load_item(path.with_name(f"{name}.even.npz")).surface
+        designed = "designed" if share_of_flat_edges(even) >= DESIGNED else "other"
+        groups[kind, designed].append(load_item(path))
+    print(f"load {os.getloadavg()[0]:.2f}; {len(paths)} items")
+    print(f"| mesh | shape | items | {' | '.join(Path(each).stem for each in asked.weights)} |")
+    print(f"|---|---|---|{'---|' * len(asked.weights)}")
+    for (kind, designed), items in sorted(groups.items()):
+        means = [np.mean([error(item, weights) for item in items]) for weights in asked.weights]
+        print(f"| {kind} | {designed} | {len(items)} | {' | '.join(f'{mean:.3f}' for mean in means)} |", flush=True)
+
+
+if __name__ == "__main__":
+    main()
