@@ -1,5 +1,6 @@
 """Training: the same losses after a stop and a resume, files that belong together, configurations that are wrong."""
 
+import itertools
 import json
 import os
 import signal
@@ -270,7 +271,7 @@ def test_folders_of_a_configuration_are_relative_to_its_file(tmp_path):
     assert load_training(tmp_path / "a.toml").network == PAPER
 
 
-@pytest.mark.parametrize(("name", "network"), [("default-further", "default"), ("paper", "paper")])
+@pytest.mark.parametrize(("name", "network"), [("default-given", "default"), ("paper", "paper")])
 def test_shipped_configurations_are_those_of_the_shipped_networks(name, network):
     loaded = load_training(name)
     assert (loaded.data, loaded.out) == ("items", name)  # relative to the current folder
@@ -280,10 +281,11 @@ def test_shipped_configurations_are_those_of_the_shipped_networks(name, network)
     assert {key: facts["training"][key] for key in same} == {key: getattr(loaded, key) for key in same}
 
 
-def test_the_second_run_of_the_default_network_starts_from_the_first():
-    first, second = load_training("default"), load_training("default-further")
-    assert first.network == second.network
-    assert second.start == str(Path(first.out) / WEIGHTS)
+def test_every_run_of_the_default_network_starts_from_the_one_before():
+    runs = [load_training(name) for name in ("default", "default-further", "default-given")]
+    for before, after in itertools.pairwise(runs):
+        assert after.network == before.network
+        assert after.start == str(Path(before.out) / WEIGHTS)
 
 
 def test_the_command_trains_stops_and_resumes(files, tmp_path, run_cli):
