@@ -271,10 +271,12 @@ def test_folders_of_a_configuration_are_relative_to_its_file(tmp_path):
     assert load_training(tmp_path / "a.toml").network == PAPER
 
 
-@pytest.mark.parametrize(("name", "network"), [("default-given", "default"), ("paper", "paper")])
-def test_shipped_configurations_are_those_of_the_shipped_networks(name, network):
+@pytest.mark.parametrize(
+    ("name", "network", "data"), [("default-given", "default", "items-given"), ("paper", "paper", "items")]
+)
+def test_shipped_configurations_are_those_of_the_shipped_networks(name, network, data):
     loaded = load_training(name)
-    assert (loaded.data, loaded.out) == ("items", name)  # relative to the current folder
+    assert (loaded.data, loaded.out) == (data, name)  # relative to the current folder
     weights, facts = load_weights(weights_path(network))
     assert loaded.network == weights.options
     same = ("epochs", "batch", "rate", "noise", "noise_share", "seed", "loss", "laplacian", "gauge", "augment")
