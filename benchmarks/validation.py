@@ -16,7 +16,6 @@ from collections import defaultdict
 from pathlib import Path
 
 import numpy as np
-import numpy.typing as npt
 
 from anisomesh.estimate import DESIGNED
 from anisomesh.learn.items import Item, load_item
@@ -25,11 +24,7 @@ from anisomesh.learn.predict import predict
 from anisomesh.learn.shipped import shipped_weights
 from anisomesh.surface.features import share_of_flat_edges
 from anisomesh.surface.geometry import sums_at_points
-
-
-def logarithm(tensors: npt.NDArray[np.float64]) -> npt.NDArray[np.float64]:
-    values, vectors = np.linalg.eigh(tensors)
-    return np.asarray((vectors * np.log(values)[:, None, :]) @ vectors.transpose(0, 2, 1))
+from rotation import logarithm
 
 
 def error(item: Item, weights: str) -> float:
