@@ -3,16 +3,12 @@
 import naive_rvd as naive
 import numpy as np
 import pytest
-from dual_cases import assert_closed_manifold
+from dual_cases import assert_closed_manifold, mended
 
-from anisomesh.cvt.features import Features
 from anisomesh.cvt.optimise import lloyd
 from anisomesh.cvt.voronoi import RestrictedVoronoi
 from anisomesh.dual.cells import cells_of
-from anisomesh.dual.refine import refine
-from anisomesh.metric.tensor import uniform_metric
 from anisomesh.surface import shapes, topology
-from anisomesh.surface.features import sharp_edges
 from anisomesh.surface.mesh import Surface
 
 CASES = {
@@ -31,20 +27,6 @@ def case(shape, n=None):
     voronoi = RestrictedVoronoi(surface.points, surface.faces)
     sites = naive.random_sites(surface.points, surface.faces, n or coarse, np.random.default_rng(0))
     return voronoi, lloyd(voronoi, sites, 5), Surface(surface.points, voronoi.faces)
-
-
-def mended(voronoi, sites, surface, scale=1.0, crease_angle=180.0):
-    sharp = sharp_edges(surface, crease_angle)
-    return refine(
-        voronoi,
-        sites,
-        surface,
-        surface,
-        Features(voronoi, surface, len(sites), sharp, np.zeros_like(sharp)),
-        scale,
-        n_vertices=len(sites),
-        tensors=uniform_metric(surface),
-    )
 
 
 @pytest.mark.parametrize("crease_angle", [30.0, 180.0])

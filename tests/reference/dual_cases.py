@@ -2,11 +2,15 @@
 
 import numpy as np
 
+from anisomesh.cvt.features import Features
 from anisomesh.cvt.optimise import lloyd
 from anisomesh.cvt.voronoi import RestrictedVoronoi
 from anisomesh.dual.cells import cells_of
+from anisomesh.dual.refine import refine
 from anisomesh.dual.triangulate import dual_mesh
+from anisomesh.metric.tensor import uniform_metric
 from anisomesh.surface import topology
+from anisomesh.surface.features import sharp_edges
 from anisomesh.surface.mesh import Surface
 
 
@@ -18,6 +22,21 @@ def dual_case(surface, sites, points=None, iterations=0):
     ordered = Surface(surface.points, voronoi.faces)
     cells = cells_of(diagram, ordered.face_neighbours, voronoi.facets.area)
     return diagram, cells, dual_mesh(diagram, cells, ordered)
+
+
+def mended(voronoi, sites, surface, scale=1.0, crease_angle=180.0):
+    """Return what refinement makes of these sites, as many vertices asked for as there are sites."""
+    sharp = sharp_edges(surface, crease_angle)
+    return refine(
+        voronoi,
+        sites,
+        surface,
+        surface,
+        Features(voronoi, surface, len(sites), sharp, np.zeros_like(sharp)),
+        scale,
+        n_vertices=len(sites),
+        tensors=uniform_metric(surface),
+    )
 
 
 def assert_closed_manifold(faces, euler):

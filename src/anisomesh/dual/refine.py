@@ -19,6 +19,7 @@ from anisomesh.dual.decimate import Links, decimate
 from anisomesh.dual.flip import flip_for_shape
 from anisomesh.dual.grow import grow
 from anisomesh.dual.insert import points_in_cells, points_in_components
+from anisomesh.dual.loops import points_on_loops
 from anisomesh.dual.place import placed
 from anisomesh.dual.separate import separate
 from anisomesh.dual.simplicial import simplicial_mesh
@@ -30,7 +31,7 @@ from anisomesh.surface.closest import ClosestPoints
 from anisomesh.surface.mesh import Surface
 from anisomesh.surface.topology import edge_keys, half_edges
 
-MAX_ROUNDS = 10
+MAX_ROUNDS = 20
 _MAX_TRIMS = 3
 _TRIM_TRIES = 50
 MAX_SHARE = 0.25  # of cells that are no disks; with more the sites are too few for this surface
@@ -103,7 +104,7 @@ def refine(
 
     Notes
     -----
-    1. While a cell is no disk, new sites go where it is farthest from its site; also where a closed component has
+    1. While a cell is no disk, new sites go on a loop in it that cannot be shrunk; also where a closed component has
        fewer than four cells, where a cell has two arcs of the boundary, and where a boundary curve has fewer than
        three; and, as far as there is room, to corners and long arcs of creases that no cell belongs to. Nothing else
        moves, so little else breaks.
@@ -121,10 +122,10 @@ def refine(
     valid, is coarsened by the same collapses. The paper inserts sites for every defect and optimises again; that makes
     new defects as it mends old ones.
 
-    This ends. Step 1 takes ten rounds at most, none of which starts with more sites than a bound; step 2 as many as it
-    says; each cut of step 3 shortens a path; each round of step 4 takes a point away; step 5 has a bound on rounds and
-    keeps the best mesh met; each flip of step 6 raises a bounded sum, each split brings the number nearer; step 7 has a
-    bound on pairs looked at. Steps 4 to 7 keep the topology, change by change. So the mesh is a manifold with the
+    This ends. Step 1 takes twenty rounds at most, none of which starts with more sites than a bound; step 2 as many as
+    it says; each cut of step 3 shortens a path; each round of step 4 takes a point away; step 5 has a bound on rounds
+    and keeps the best mesh met; each flip of step 6 raises a bounded sum, each split brings the number nearer; step 7
+    has a bound on pairs looked at. Steps 4 to 7 keep the topology, change by change. So the mesh is a manifold with the
     topology of the surface however they end; turned triangles and intersections that they leave are counted by
     :func:`anisomesh.evaluation.validity.check_validity`.
     """
@@ -177,9 +178,11 @@ def _with_enough_sites(
         bad = cells.euler != 1
         arcs = features.boundary.arcs(diagram)
         creased = creased_cells(features.creases, features.creases.arcs(diagram), arcs, cells, sites)
+        on_loops, looped = points_on_loops(diagram, cells, surface, bad)
         missing = np.concatenate(
             [
-                points_in_cells(diagram, cells, bad),
+                on_loops,
+                points_in_cells(diagram, cells, bad & ~looped),
                 points_in_components(diagram, cells, surface),
                 points_on_boundary(arcs, features.boundary.curves, cells, sites),
             ]
