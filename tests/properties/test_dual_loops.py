@@ -32,12 +32,12 @@ def spindle(height):
 
 
 def loops_of(surface, sites, points=None):
-    """Return diagram, ordered surface, cells, and points on loops of all cells that are no disks."""
+    """Return the cells of these sites, the points on loops in them, the diagram's surface and the one in space."""
     voronoi = RestrictedVoronoi(surface.points if points is None else points, surface.faces)
     ordered = Surface(surface.points, voronoi.faces)
     diagram = voronoi.diagram(np.asarray(sites, dtype=float))
     cells = cells_of(diagram, ordered.face_neighbours, voronoi.facets.area)
-    return cells, *points_on_loops(diagram, cells, ordered, cells.euler != 1), voronoi, ordered
+    return cells, points_on_loops(diagram, cells, ordered), voronoi, ordered
 
 
 def is_cut_open(voronoi, surface, sites):
@@ -52,9 +52,8 @@ TORUS = shapes.torus(n_major=48, n_minor=20)
 @pytest.mark.parametrize("angle", [0.0, 1.0, 3.0])
 def test_two_points_divide_a_loop_around_a_tube_in_three_with_the_site(angle):
     site = np.array([np.cos(angle), np.sin(angle), 20.3])
-    cells, points, having, voronoi, surface = loops_of(TUBE, [site])
+    cells, points, voronoi, surface = loops_of(TUBE, [site])
     assert cells.euler.tolist() == [0]
-    assert having.tolist() == [True]
     assert len(points) == 2
     turns = np.sort(np.mod(np.arctan2(points[:, 1], points[:, 0]) - angle, 2.0 * np.pi))
     np.testing.assert_allclose(turns, [2.0 * np.pi / 3.0, 4.0 * np.pi / 3.0], atol=0.3)
@@ -63,9 +62,8 @@ def test_two_points_divide_a_loop_around_a_tube_in_three_with_the_site(angle):
 
 
 def test_the_loop_on_a_torus_is_the_short_one():
-    cells, points, having, _, _ = loops_of(TORUS, [[1.35, 0.0, 0.0]])
+    cells, points, _, _ = loops_of(TORUS, [[1.35, 0.0, 0.0]])
     assert cells.euler.tolist() == [0]
-    assert having.all()
     assert len(points) == 2
     assert np.abs(np.arctan2(points[:, 1], points[:, 0])).max() < 0.2  # around the tube, at the angle of the site
     assert np.linalg.norm(points[0] - points[1]) > 0.4
@@ -74,8 +72,8 @@ def test_the_loop_on_a_torus_is_the_short_one():
 def test_points_are_on_the_embedded_surface():
     rng = np.random.default_rng(3)
     embedded = np.column_stack([TORUS.points, rng.normal(scale=0.1, size=(TORUS.n_points, 5))])
-    _, points, having, voronoi, _ = loops_of(TORUS, embedded[[0, 400]], embedded)
-    assert having.any()
+    _, points, voronoi, _ = loops_of(TORUS, embedded[[0, 400]], embedded)
+    assert len(points)
     corners = voronoi.points[voronoi.faces]
     for point in points:  # barycentric coordinates by least squares in each face
         basis = corners[:, 1:] - corners[:, :1]
@@ -92,30 +90,28 @@ def test_a_hole_far_from_the_site_is_gone_round_closely():
     near = np.linalg.norm(sheet.points[sheet.faces].mean(axis=1) - hole, axis=1) < 0.1
     used, faces = np.unique(sheet.faces[~near], return_inverse=True)
     holed = Surface(sheet.points[used], faces.reshape(-1, 3))
-    cells, points, having, _, _ = loops_of(holed, [[-0.7, -0.7, 0.0]])
+    cells, points, _, _ = loops_of(holed, [[-0.7, -0.7, 0.0]])
     assert cells.euler.tolist() == [0]
-    assert having.all()
     assert len(points) == 3
     assert np.linalg.norm(points - hole, axis=1).max() < 0.3
     assert np.linalg.norm(points - np.roll(points, 1, axis=0), axis=1).min() > 0.1
 
 
-@pytest.mark.parametrize("make", [lambda: shapes.sphere(3), lambda: shapes.open_patch(lambda x, y: x * y, n=9)])
-def test_what_has_no_loop_is_left_to_others(make):
-    surface = make()
-    voronoi = RestrictedVoronoi(surface.points, surface.faces)
-    ordered = Surface(surface.points, voronoi.faces)
-    diagram = voronoi.diagram(surface.points[:1])
-    cells = cells_of(diagram, ordered.face_neighbours, voronoi.facets.area)
-    points, having = points_on_loops(diagram, cells, ordered, np.ones(len(cells.euler), dtype=bool))
+@pytest.mark.parametrize(
+    ("surface", "euler"),
+    [(shapes.sphere(3), 2), (shapes.open_patch(lambda x, y: x * y, n=9), 1)],
+    ids=["sphere", "disk"],
+)
+def test_where_all_loops_shrink_there_are_no_points(surface, euler):
+    cells, points, _, _ = loops_of(surface, surface.points[:1])
+    assert cells.euler.tolist() == [euler]
     assert points.shape == (0, 3)
-    assert not having.any()
 
 
 def test_nothing_is_asked_of_disks():
-    points, having = loops_of(TORUS, TORUS.points[::3])[1:3]
+    cells, points, _, _ = loops_of(TORUS, TORUS.points[::3])
+    assert (cells.euler == 1).all()
     assert points.shape == (0, 3)
-    assert not having.any()
 
 
 def test_a_site_alone_around_a_cone_does_not_draw_others_to_the_tip():

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from itertools import pairwise
 from typing import Any
 
 import numpy as np
@@ -66,19 +65,15 @@ class _Loop:
         return np.stack([np.interp(wanted, along, coordinate) for coordinate in self.corners.T], axis=1)
 
 
-def points_on_loops(
-    diagram: Diagram, cells: Cells, surface: Surface, bad: npt.NDArray[np.bool_]
-) -> tuple[EmbeddedPoints, npt.NDArray[np.bool_]]:
-    """Return points (n, d) on a loop in each ``bad`` cell that cannot be shrunk, and which cells have one (C,).
+def points_on_loops(diagram: Diagram, cells: Cells, surface: Surface) -> EmbeddedPoints:
+    """Return points (n, d) on a loop that cannot be shrunk in each cell that is no disk, nor a whole closed component.
 
     Parameters
     ----------
     diagram, cells
-        The diagram and the components of its cells (C).
+        The diagram and the components of its cells.
     surface
         The surface in space, its faces in the order of the diagram.
-    bad
-        Cells that are no disks (C,).
 
     Notes
     -----
@@ -92,7 +87,7 @@ def points_on_loops(
     root, and a loop that crosses it once cannot be shrunk (Erickson and Whittlesey 2005, greedy optimal homotopy and
     homology generators).
     """
-    chosen = np.flatnonzero(bad)
+    chosen = np.flatnonzero(cells.euler != 1)
     patches = _patches(diagram, cells, surface, chosen)
     starts = diagram.sites[cells.site[chosen]].copy()
     loops = _shortest_loops(patches, _nearest(patches, starts))
@@ -101,14 +96,11 @@ def points_on_loops(
     tight = _shortest_loops(patches, _nearest(patches, starts))
     points = [np.empty((0, diagram.points.shape[1]))]
     for number, loop in loops.items():
-        around = tight.get(number, loop)
-        if loop.steps.sum() <= _DETOUR * around.steps.sum():
+        if loop.steps.sum() <= _DETOUR * tight[number].steps.sum():
             points.append(loop.at(1 / 3, 2 / 3))
         else:
-            points.append(around.at(0.0, 1 / 3, 2 / 3))
-    having = np.zeros(len(bad), dtype=bool)
-    having[chosen[list(loops)]] = True
-    return np.concatenate(points), having
+            points.append(tight[number].at(0.0, 1 / 3, 2 / 3))
+    return np.concatenate(points)
 
 
 def _patches(diagram: Diagram, cells: Cells, surface: Surface, chosen: Indices) -> _Patches:
@@ -162,34 +154,37 @@ def _shortest_loops(patches: _Patches, roots: Indices) -> dict[int, _Loop]:
     graph = coo_array((weight, (patches.pair[:, 0], patches.pair[:, 1])), shape=(n, n)).tocsr()
     distance, before, _ = dijkstra(graph, directed=False, indices=roots, min_only=True, return_predecessors=True)
     here, there = patches.pair.T
-    crossed = (before[there] == here) | (before[here] == there)
+    pairs, sides = np.unique(patches.pair, axis=0, return_index=True)  # two facets can share more than one side
+    crossed = np.zeros(len(weight), dtype=bool)
+    crossed[sides] = (before[pairs[:, 1]] == pairs[:, 0]) | (before[pairs[:, 0]] == pairs[:, 1])
     cut = _cut_locus(patches.ends, crossed)
     order = cut[np.lexsort(((distance[here] + weight + distance[there])[cut], patches.cell[here[cut]]))]
     names, first = np.unique(patches.cell[here[order]], return_index=True)
-    side_of = {frozenset(pair): side for side, pair in enumerate(patches.pair.tolist())}
+    gates = {frozenset(pair): patches.gate[side] for pair, side in zip(pairs.tolist(), sides.tolist(), strict=True)}
     loops = {}
     for name, side in zip(names.tolist(), order[first].tolist(), strict=True):
-        way = [*_way_to_root(before, here[side])[::-1], *_way_to_root(before, there[side])]
-        corners = [patches.centre[way[0]]]
-        for one, other in pairwise(way):
-            corners += [patches.gate[side_of[frozenset((one, other))]], patches.centre[other]]
-        loops[name] = _Loop(np.array(corners))
+        out, back = (_way_from_root(patches.centre, before, gates, end) for end in patches.pair[side].tolist())
+        loops[name] = _Loop(np.array([*out, patches.gate[side], *back[::-1]]))
     return loops
 
 
-def _way_to_root(before: npt.NDArray[np.int32], polygon: int) -> list[int]:
-    way = [int(polygon)]
-    while before[way[-1]] >= 0:
-        way.append(int(before[way[-1]]))
-    return way
+def _way_from_root(
+    centre: EmbeddedPoints, before: npt.NDArray[np.int32], gates: dict[frozenset[int], EmbeddedPoints], polygon: int
+) -> list[EmbeddedPoints]:
+    """Return the corners of the path through the tree to a polygon."""
+    way = [centre[polygon]]
+    while (parent := int(before[polygon])) >= 0:
+        way += [gates[frozenset((parent, polygon))], centre[parent]]
+        polygon = parent
+    return way[::-1]
 
 
-def _cut_locus(ends: Indices, crossing: npt.NDArray[np.bool_]) -> Indices:
+def _cut_locus(ends: Indices, crossed: npt.NDArray[np.bool_]) -> Indices:
     """Return which of the sides (m,) that no tree crosses are left when those that hang on by one end are taken away.
 
     An end at the rim of a cell holds; one at a vertex of the surface holds while another side ends there.
     """
-    left = np.flatnonzero(~crossing)
+    left = np.flatnonzero(~crossed)
     while len(left):
         inner = ends[left] >= 0
         count = np.bincount(ends[left][inner], minlength=ends.max(initial=0) + 1)

@@ -14,11 +14,11 @@ from anisomesh.cvt.features import Features
 from anisomesh.cvt.voronoi import RestrictedVoronoi
 from anisomesh.dual.boundary import points_on_boundary
 from anisomesh.dual.cells import Cells, cells_of
+from anisomesh.dual.components import points_in_components
 from anisomesh.dual.creases import CreasedCells, creased_cells, join_along_creases
 from anisomesh.dual.decimate import Links, decimate
 from anisomesh.dual.flip import flip_for_shape
 from anisomesh.dual.grow import grow
-from anisomesh.dual.insert import points_in_cells, points_in_components
 from anisomesh.dual.loops import points_on_loops
 from anisomesh.dual.place import placed
 from anisomesh.dual.separate import separate
@@ -178,16 +178,14 @@ def _with_enough_sites(
         bad = cells.euler != 1
         arcs = features.boundary.arcs(diagram)
         creased = creased_cells(features.creases, features.creases.arcs(diagram), arcs, cells, sites)
-        on_loops, looped = points_on_loops(diagram, cells, surface, bad)
         missing = np.concatenate(
             [
-                on_loops,
-                points_in_cells(diagram, cells, bad & ~looped),
+                points_on_loops(diagram, cells, surface),
                 points_in_components(diagram, cells, surface),
                 points_on_boundary(arcs, features.boundary.curves, cells, sites),
             ]
         )
-        complete = len(missing) == 0
+        complete = len(missing) == 0 and not bad.any()
         on_creases = creased.missing[:room]
         if len(missing) + len(on_creases) == 0 or bad.mean() > MAX_SHARE or len(sites) + len(missing) > most:
             break

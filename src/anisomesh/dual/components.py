@@ -1,9 +1,8 @@
-"""Points that are missing as sites for the dual to be a mesh with the topology of the surface."""
+"""Closed components with too few cells for the dual to have their topology."""
 
 from __future__ import annotations
 
 import numpy as np
-import numpy.typing as npt
 
 from anisomesh._arrays import EmbeddedPoints
 from anisomesh.cvt.diagram import Diagram
@@ -12,26 +11,6 @@ from anisomesh.surface.mesh import Surface
 from anisomesh.surface.topology import connected_components
 
 MIN_CELLS = 4  # of a closed component: with three the dual is two triangles back to back, with fewer it has none
-
-
-def points_in_cells(diagram: Diagram, cells: Cells, bad: npt.NDArray[np.bool_]) -> EmbeddedPoints:
-    """Return two points of each cell that is ``bad`` (C,): farthest from its site, and farthest from both (n, d)."""
-    component = cells.of_polygon[diagram.polygon_of]
-    vertex = np.flatnonzero(bad[component])
-    component = component[vertex]
-    polygon = diagram.polygon_of[vertex]
-    position = diagram.at(diagram.facet[polygon], diagram.barycentric[vertex])
-    centre = diagram.sites[diagram.site[polygon]]
-    distance = np.linalg.norm(position - centre, axis=1)
-    chosen = []
-    for _ in range(2):
-        order = np.lexsort((-distance, component))
-        names, first = np.unique(component[order], return_index=True)
-        best = order[first]
-        chosen.append(position[best])
-        to_best = np.linalg.norm(position - position[best][np.searchsorted(names, component)], axis=1)
-        distance = np.minimum(distance, to_best)
-    return np.concatenate(chosen)
 
 
 def points_in_components(diagram: Diagram, cells: Cells, surface: Surface) -> EmbeddedPoints:
