@@ -272,7 +272,7 @@ def test_folders_of_a_configuration_are_relative_to_its_file(tmp_path):
 
 
 @pytest.mark.parametrize(
-    ("name", "network", "data"), [("default-given", "default", "items-given"), ("paper", "paper", "items")]
+    ("name", "network", "data"), [("default-more", "default", "items-given"), ("paper", "paper", "items")]
 )
 def test_shipped_configurations_are_those_of_the_shipped_networks(name, network, data):
     loaded = load_training(name)
@@ -284,7 +284,7 @@ def test_shipped_configurations_are_those_of_the_shipped_networks(name, network,
 
 
 def test_every_run_of_the_default_network_starts_from_the_one_before():
-    runs = [load_training(name) for name in ("default", "default-further", "default-given")]
+    runs = [load_training(name) for name in ("default", "default-further", "default-given", "default-more")]
     for before, after in itertools.pairwise(runs):
         assert after.network == before.network
         assert after.start == str(Path(before.out) / WEIGHTS)
