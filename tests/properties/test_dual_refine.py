@@ -8,6 +8,7 @@ from dual_cases import assert_closed_manifold, mended
 from anisomesh.cvt.optimise import lloyd
 from anisomesh.cvt.voronoi import RestrictedVoronoi
 from anisomesh.dual.cells import cells_of
+from anisomesh.evaluation.distance import surface_distance
 from anisomesh.surface import shapes, topology
 from anisomesh.surface.mesh import Surface
 
@@ -79,3 +80,20 @@ def test_small_components_keep_their_shape_with_few_sites():
         assert_closed_manifold(result.faces, 16)
         assert topology.connected_components(result.faces, len(result.points))[0] == 8
         assert len(np.unique(np.sort(result.faces, axis=1), axis=0)) == len(result.faces)
+
+
+def test_more_creases_than_vertices_do_not_cost_what_is_beside_them():
+    """Regression: where creases fix most of the points asked for, collapses took all others, whatever that cost."""
+
+    def pyramids_and_waves(x, y):
+        ridge = np.minimum(np.abs(8.0 * (x + 1.0) % 2.0 - 1.0), np.abs(8.0 * (y + 1.0) % 2.0 - 1.0))
+        return np.where(x < 0.0, 0.15 * ridge, 0.3 * np.sin(np.pi * x) * np.cos(0.5 * np.pi * y))
+
+    sheet = shapes.open_patch(pyramids_and_waves, n=64)
+    voronoi = RestrictedVoronoi(sheet.points, sheet.faces)
+    sites = lloyd(voronoi, naive.random_sites(sheet.points, sheet.faces, 200, np.random.default_rng(1)), 10)
+    result = mended(voronoi, sites, Surface(sheet.points, voronoi.faces), crease_angle=30.0, always=True)
+    mesh = Surface(result.points, result.faces)
+    assert (mesh.n_points, result.from_input) == (200, False)
+    assert mesh.edge_lengths.max() < 1.0  # the waves are 1 wide
+    assert surface_distance(mesh, sheet).rms < 0.02

@@ -24,7 +24,7 @@ def dual_case(surface, sites, points=None, iterations=0):
     return diagram, cells, dual_mesh(diagram, cells, ordered)
 
 
-def mended(voronoi, sites, surface, scale=1.0, crease_angle=180.0):
+def mended(voronoi, sites, surface, scale=1.0, crease_angle=180.0, always=False):
     """Return what refinement makes of these sites, as many vertices asked for as there are sites."""
     sharp = sharp_edges(surface, crease_angle)
     return refine(
@@ -32,7 +32,7 @@ def mended(voronoi, sites, surface, scale=1.0, crease_angle=180.0):
         sites,
         surface,
         surface,
-        Features(voronoi, surface, len(sites), sharp, np.zeros_like(sharp)),
+        Features(voronoi, surface, len(sites), sharp, sharp & always),
         scale,
         n_vertices=len(sites),
         tensors=uniform_metric(surface),

@@ -84,6 +84,12 @@ def decimate(
     return points[used], faces.reshape(-1, 3).astype(np.int32), np.searchsorted(used, links)
 
 
+def fixed_by(creases: Links, n_points: int) -> PointMask:
+    """Return which points (n_points,) no collapse along these creases (n, 2) takes: corners, and ends."""
+    count = np.bincount(creases.ravel(), minlength=n_points)
+    return np.asarray((count != 0) & (count != 2))
+
+
 def _quadrics(surface: Surface, links: Ints) -> Floats:
     """Return the sum of weight times squared plane at each point (V, 4, 4).
 
@@ -124,9 +130,10 @@ def _collapses(
     gone, into = np.concatenate([edges, edges[:, ::-1]]).T
     allowed = ~kept[gone] & (~surface.on_boundary[gone] | surface.on_boundary[into])
     allowed &= ~np.isin(gone * surface.n_points + into, refused)
-    n_links = np.bincount(links.ravel(), minlength=surface.n_points)
+    on_crease = np.zeros(surface.n_points, dtype=bool)
+    on_crease[links] = True
     along = np.isin(edge_keys(np.stack([gone, into], axis=1)), edge_keys(links))
-    allowed &= (n_links[gone] == 0) | (along & (n_links[gone] == 2))
+    allowed &= ~fixed_by(links, surface.n_points)[gone] & (along | ~on_crease[gone])
     gone, into = gone[allowed], into[allowed]
     place = np.concatenate([surface.points[into], np.ones((len(into), 1))], axis=1)
     area = np.bincount(surface.faces.ravel(), np.repeat(surface.face_areas, 3), minlength=surface.n_points)

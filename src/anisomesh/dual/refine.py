@@ -16,7 +16,7 @@ from anisomesh.dual.boundary import points_on_boundary
 from anisomesh.dual.cells import Cells, cells_of
 from anisomesh.dual.components import points_in_components
 from anisomesh.dual.creases import CreasedCells, creased_cells, join_along_creases
-from anisomesh.dual.decimate import Links, decimate
+from anisomesh.dual.decimate import Links, decimate, fixed_by
 from anisomesh.dual.flip import flip_for_shape
 from anisomesh.dual.grow import grow
 from anisomesh.dual.loops import points_on_loops
@@ -37,6 +37,7 @@ _TRIM_TRIES = 50
 MAX_SHARE = 0.25  # of cells that are no disks; with more the sites are too few for this surface
 MAX_CREASE_SHARE = 0.5  # of the vertices asked for: sites added on creases
 MAX_KEPT = 0.5  # of the vertices asked for: corners that collapses leave alone
+MAX_FIXED = 0.6  # of the vertices asked for: points that creases let go nowhere
 MAX_GROWTH, MAX_MORE = 4, 1_000  # the most sites are so many times the vertices asked for, and so many more
 
 
@@ -112,7 +113,9 @@ def refine(
        surface (a regular cell complex; compare the closed ball property of Edelsbrunner and Shah 1997). Points on edges
        that occur twice make it a simplicial mesh.
     3. Flips join vertices that follow each other on a crease.
-    4. What this inserted is taken away by edge collapses with the link condition, cheapest first.
+    4. What this inserted is taken away by edge collapses with the link condition, cheapest first. Where creases fix
+       more than a share of the vertices asked for, as on a rough surface or with few vertices, collapses do not follow
+       them: they would have to take all that is beside the creases.
     5. Triangles that face away from the surface are turned back by edge flips and moves.
     6. Edges are flipped where that gives better triangles in the metric, and the longest split if points are missing.
     7. Triangles that intersect where the surface does not are taken apart; points that this takes are made up for by
@@ -146,7 +149,8 @@ def refine(
     n_first = len(space)
     space, faces, links, kept = _untangled(space, faces, links, kept, reference, stop)
     if len(space) > n_vertices:
-        space, faces, links = decimate(space, faces, n_vertices, reference, kept=kept, creases=links)
+        if np.count_nonzero(kept | fixed_by(links, len(space))) <= MAX_FIXED * n_vertices:
+            space, faces, links = decimate(space, faces, n_vertices, reference, kept=kept, creases=links)
         if len(space) > n_vertices:  # fewer than the creases need
             space, faces, links = decimate(space, faces, n_vertices, reference)
         space, faces, links, _ = _untangled(space, faces, links, np.zeros(len(space), dtype=bool), reference, stop)
