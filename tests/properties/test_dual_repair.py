@@ -2,13 +2,14 @@
 
 import numpy as np
 import pytest
+from creases import wedge
 
 from anisomesh.cvt.voronoi import RestrictedVoronoi
 from anisomesh.dual.cells import cells_of
 from anisomesh.dual.decimate import collapsible_edges, decimate
 from anisomesh.dual.exchange import exchange_sites
 from anisomesh.dual.grow import grow
-from anisomesh.dual.place import cells_with_crease, crease_positions, snap_to_missed
+from anisomesh.dual.place import cells_with_crease, crease_positions, on_main_planes, snap_to_missed
 from anisomesh.dual.simplicial import simplicial_mesh
 from anisomesh.dual.triangulate import dual_mesh
 from anisomesh.dual.untangle import untangle
@@ -121,6 +122,24 @@ def _box_dual(n_sites, seed=0):
     sites = surface.points[rng.choice(surface.n_points, n_sites, replace=False)] * 0.98 + 0.01
     diagram = voronoi.diagram(sites)
     return ordered, voronoi, diagram, cells_of(diagram, ordered.face_neighbours, voronoi.facets.area)
+
+
+def test_a_sliver_beyond_a_crease_does_not_lift_the_vertex_off_its_plane():
+    """Regression: between two planes at 120 degrees a vertex was off the one that nearly all of its cell lies in."""
+    roof = wedge(np.radians(120.0))
+    left, right = (np.array([side * np.sin(np.pi / 3.0), 0.0, -0.5]) for side in (-1.0, 1.0))
+    voronoi = RestrictedVoronoi(roof.points, roof.faces, threads=1)
+    surface = Surface(roof.points, voronoi.faces)
+    diagram = voronoi.diagram(np.stack([0.4 * left, 0.4002 * right]))
+    cells = cells_of(diagram, surface.face_neighbours, voronoi.facets.area)
+    chosen = cells_with_crease(diagram, cells, surface, sharp_edges(surface, 40.0))
+    assert cells.site[chosen].tolist() == [0]  # the other has nothing of the crest
+    lifted = crease_positions(voronoi, diagram, cells, 1.0, chosen)
+    placed = on_main_planes(diagram, cells, surface, chosen, lifted)
+    normal = np.cross(left, [0.0, 1.0, 0.0])
+    assert abs(lifted[0] @ normal) > 1e-9
+    assert abs(placed[0] @ normal) < 1e-15
+    assert np.linalg.norm(placed - lifted) < 1e-4
 
 
 def test_vertices_of_creased_cells_go_to_where_their_planes_meet():

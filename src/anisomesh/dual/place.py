@@ -21,6 +21,7 @@ from anisomesh.surface.mesh import Surface
 _SHARPNESS = 100.0
 _MOST_OFF = 0.1  # mean edge lengths by which the vertex may be off a curved crease
 _SAME_PLANE = 1e-9  # by which the normals of facets in one plane may differ
+_NEAR_PLANE = 1e-3  # roots of the area of a cell
 _MISSED = 0.05  # mean edge lengths between a corner and the mesh, from which on it counts as missed
 
 
@@ -60,7 +61,7 @@ def placed(
     space = put_on_planes(diagram, cells, surface, points[:, :3] / scale)
     sharp = cells_with_crease(diagram, cells, surface, features.sharp)
     where = crease_positions(voronoi, diagram, cells, scale, sharp)
-    space[sharp] = where
+    space[sharp] = on_main_planes(diagram, cells, surface, sharp, where)
     space[fixed] = on_rim[fixed, :3] / scale
     space[creased.cell] = creased.place[:, :3] / scale
     bent = creased.bent & ~creased.corner
@@ -126,6 +127,24 @@ def put_on_planes(diagram: Diagram, cells: Cells, surface: Surface, points: Poin
     moved = np.array(points)
     moved[: len(flat)][flat] -= (height[:, None] * normal)[flat]
     return moved
+
+
+def on_main_planes(
+    diagram: Diagram, cells: Cells, surface: Surface, chosen: npt.NDArray[np.int64], points: Points
+) -> Points:
+    """Return the points of the chosen cells (n, 3), exactly in the plane of the largest piece of the cell if near it.
+
+    That is for cells in two planes: a sliver beyond a crease pulls the vertex a little out of the plane that all the
+    rest is in, without bringing it to the crease.
+    """
+    area = diagram.fractions * surface.face_areas[diagram.facet]
+    order = np.lexsort((-area, cells.of_polygon))
+    facet = diagram.facet[order[np.unique(cells.of_polygon[order], return_index=True)[1]]][chosen]
+    normal, start = surface.face_normals[facet], surface.points[surface.faces[facet, 0]]
+    height = np.einsum("nx,nx->n", points - start, normal)
+    size = np.sqrt(np.bincount(cells.of_polygon, area)[chosen])
+    near = (np.abs(height) < _NEAR_PLANE * size) & (_planes(diagram, cells, surface)[chosen] == 2)
+    return np.where(near[:, None], points - height[:, None] * normal, points)
 
 
 def _planes(diagram: Diagram, cells: Cells, surface: Surface) -> npt.NDArray[np.int64]:
