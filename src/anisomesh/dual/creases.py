@@ -6,6 +6,7 @@ from dataclasses import dataclass
 from itertools import pairwise
 
 import numpy as np
+from scipy.spatial import cKDTree
 
 from anisomesh._arrays import EmbeddedPoints, Faces, Points, Sites
 from anisomesh.cvt.arcs import LONG, Arcs, Mask, changes, nearest_to_sites
@@ -16,6 +17,7 @@ from anisomesh.surface.curves import Ints
 
 _NEAR = 0.1  # of the distance between sites: a site so near to a crease belongs to it
 _BEND = 1e-3  # of its chord that the middle of a curved arc is off it, at least
+_APART = 0.1  # distances between sites that a new one on an arc is from others, at least
 _SAME = 1e-6  # of the distance between sites: a place so near to a corner is the corner
 
 
@@ -36,7 +38,8 @@ class CreasedCells:
     corner
         Whether it is a corner or at the boundary (n,).
     missing
-        Places that need a cell of their own (m, d): further corners, then further long arcs from the longest on.
+        Places that need a cell of their own (m, d): further corners, then further long arcs from the longest on, but
+        none where a site is near: sites one beside the other would follow a crease at the pace of their distance.
     links
         Components that follow each other on a crease and belong to it (l, 2).
     bridges
@@ -89,6 +92,8 @@ def creased_cells(creases: Creases, arcs: CreaseArcs, rim: Arcs, cells: Cells, s
     inner = [np.array(gap[1:-1]) for gap in gaps]
     wide = [k[np.argmax(arcs.length[k])] for k in inner if arcs.length[k].sum() > LONG * spacing]
     wide.sort(key=lambda k: -arcs.length[k])
+    on_arcs = nearest[np.array(wide, dtype=np.int64)]
+    apart = cKDTree(sites).query(on_arcs)[0] > _APART * spacing
     cell = np.flatnonzero((own >= 0) | (corner >= 0))
     start, end = (creases.curves.at(at[own[cell]], arcs.curve[own[cell]]) for at in (arcs.start, arcs.end))
     return CreasedCells(
@@ -97,7 +102,7 @@ def creased_cells(creases: Creases, arcs: CreaseArcs, rim: Arcs, cells: Cells, s
         chord=end - start,
         bent=_bent(creases, arcs, own[cell], end - start) & (own[cell] >= 0),
         corner=(corner[cell] >= 0) | at_rim[cell],
-        missing=np.concatenate([positions[further], nearest[np.array(wide, dtype=np.int64)]]),
+        missing=np.concatenate([positions[further], on_arcs[apart]]),
         links=links[links[:, 0] != links[:, 1]],
         bridges=[component[gap].tolist() for gap in gaps],
     )

@@ -17,6 +17,7 @@ from anisomesh.dual.cells import Cells, cells_of
 from anisomesh.dual.components import points_in_components
 from anisomesh.dual.creases import CreasedCells, creased_cells, join_along_creases
 from anisomesh.dual.decimate import Links, decimate, fixed_by
+from anisomesh.dual.faults import faulty_faces, points_at_faults
 from anisomesh.dual.flip import flip_for_shape
 from anisomesh.dual.grow import grow
 from anisomesh.dual.loops import points_on_loops
@@ -31,9 +32,14 @@ from anisomesh.surface.closest import ClosestPoints
 from anisomesh.surface.mesh import Surface
 from anisomesh.surface.topology import edge_keys, half_edges
 
+_Linked = tuple[Points, Faces, Links, PointMask]
+"""A mesh, its edges along creases, and which of its points are to be kept."""
+
 MAX_ROUNDS = 20
 _MAX_TRIMS = 3
 _TRIM_TRIES = 50
+_TRIES, _TRIES_COARSENED = 300, 1_000  # pairs of triangles looked at, and of those of coarsened input
+_MAX_REPEATS = 2  # with more sites where triangles are turned or intersect
 MAX_SHARE = 0.25  # of cells that are no disks; with more the sites are too few for this surface
 MAX_CREASE_SHARE = 0.5  # of the vertices asked for: sites added on creases
 MAX_KEPT = 0.5  # of the vertices asked for: corners that collapses leave alone
@@ -120,6 +126,8 @@ def refine(
     6. Edges are flipped where that gives better triangles in the metric, and the longest split if points are missing.
     7. Triangles that intersect where the surface does not are taken apart; points that this takes are made up for by
        collapses elsewhere.
+    8. Where triangles are turned or intersect all the same, more sites are put, and all is done once more, twice at
+       most. So the mesh has more vertices there, and fewer elsewhere.
 
     Where step 1 or 2 does not succeed (a tube thinner than the distance between sites) the surface itself, which is
     valid, is coarsened by the same collapses. The paper inserts sites for every defect and optimises again; that makes
@@ -128,24 +136,48 @@ def refine(
     This ends. Step 1 takes twenty rounds at most, none of which starts with more sites than a bound; step 2 as many as
     it says; each cut of step 3 shortens a path; each round of step 4 takes a point away; step 5 has a bound on rounds
     and keeps the best mesh met; each flip of step 6 raises a bounded sum, each split brings the number nearer; step 7
-    has a bound on pairs looked at. Steps 4 to 7 keep the topology, change by change. So the mesh is a manifold with the
-    topology of the surface however they end; turned triangles and intersections that they leave are counted by
-    :func:`anisomesh.evaluation.validity.check_validity`.
+    has a bound on pairs looked at; of the repeats the best is kept. Steps 4 to 7 keep the topology, change by change.
+    So the mesh is a manifold with the topology of the surface however they end; turned triangles and intersections that
+    they leave are counted by :func:`anisomesh.evaluation.validity.check_validity`.
     """
-    n_start = len(sites)
-    diagram, cells, arcs, creased, complete = _with_enough_sites(voronoi, sites, surface, features, n_vertices)
     reference = ClosestPoints(surface)
-    links, kept = np.zeros((0, 2), dtype=np.int64), np.zeros(len(plain.points), dtype=bool)
-    if complete:
-        points, faces, complete = simplicial_mesh(dual_mesh(diagram, cells, surface))
-    if complete:
-        space = placed(voronoi, diagram, cells, surface, features, arcs, creased, points, faces, scale)
-        faces = join_along_creases(space, faces, creased.bridges, reference)
-        links = creased.links[np.isin(edge_keys(creased.links), edge_keys(half_edges(faces)))]
-        kept = np.zeros(len(space), dtype=bool)
-        kept[creased.cell[creased.corner][: int(MAX_KEPT * n_vertices)]] = True
-    else:
-        space, faces = plain.points, plain.faces
+    task = _Task(voronoi, surface, plain, features, scale, n_vertices, metric_root(tensors), reference, stop)
+    n_start = len(sites)
+    best = _refined(task, sites, n_start)
+    faulty = faulty_faces(best.points, best.faces, reference)
+    trial, bad = best, faulty
+    for _ in range(_MAX_REPEATS):
+        if len(bad) == 0 or trial.from_input or stop():
+            break
+        places = trial.points[trial.faces[bad]]
+        sites = np.concatenate([sites, points_at_faults(places, reference, voronoi, sites, features.creases.spacing)])
+        trial = _refined(task, sites, n_start)
+        bad = faulty_faces(trial.points, trial.faces, reference)
+        if len(bad) < len(faulty):
+            best, faulty = trial, bad
+    return best
+
+
+@dataclass(frozen=True, eq=False)
+class _Task:
+    """What a mesh is made from besides sites, as for :func:`refine`; of the tensors the roots."""
+
+    voronoi: RestrictedVoronoi
+    surface: Surface
+    plain: Surface
+    features: Features
+    scale: float
+    n_vertices: int
+    roots: PointTensors
+    reference: ClosestPoints
+    stop: Stop
+
+
+def _refined(task: _Task, sites: Sites, n_start: int) -> Refined:
+    """Return the mesh of these sites, of which the first were optimised: steps 1 to 7 of :func:`refine`."""
+    n_vertices, reference, stop = task.n_vertices, task.reference, task.stop
+    diagram, cells, mesh = _dual(task, sites)
+    space, faces, links, kept = mesh or _from_input(task.plain)
     n_first = len(space)
     space, faces, links, kept = _untangled(space, faces, links, kept, reference, stop)
     if len(space) > n_vertices:
@@ -154,20 +186,41 @@ def refine(
         if len(space) > n_vertices:  # fewer than the creases need
             space, faces, links = decimate(space, faces, n_vertices, reference)
         space, faces, links, _ = _untangled(space, faces, links, np.zeros(len(space), dtype=bool), reference, stop)
-    roots = transfer_metric_roots(reference, metric_root(tensors), space)
+    roots = transfer_metric_roots(reference, task.roots, space)
     faces = flip_for_shape(space, faces, roots, reference, kept=links)
     if len(space) < n_vertices:
         space, faces = grow(space, faces, n_vertices, reference, roots)
-    space, faces = _without_crossings(space, faces, links, n_vertices, reference, stop)
+    tries = _TRIES if mesh else _TRIES_COARSENED
+    space, faces = _without_crossings(space, faces, links, n_vertices, reference, tries, stop)
     return Refined(
         points=space,
         faces=faces,
         diagram=diagram,
         cells=cells,
-        inserted=max(n_first - n_start, 0) if complete else 0,
+        inserted=max(n_first - n_start, 0) if mesh else 0,
         removed=max(n_first - len(space), 0),
-        from_input=not complete,
+        from_input=mesh is None,
     )
+
+
+def _dual(task: _Task, sites: Sites) -> tuple[Diagram, Cells, _Linked | None]:
+    """Return diagram, cells and the dual in space: steps 1 to 3; None where cells are no disks."""
+    voronoi, surface, n_vertices = task.voronoi, task.surface, task.n_vertices
+    diagram, cells, arcs, creased, complete = _with_enough_sites(voronoi, sites, surface, task.features, n_vertices)
+    if complete:
+        points, faces, complete = simplicial_mesh(dual_mesh(diagram, cells, surface))
+    if not complete:
+        return diagram, cells, None
+    space = placed(voronoi, diagram, cells, surface, task.features, arcs, creased, points, faces, task.scale)
+    faces = join_along_creases(space, faces, creased.bridges, task.reference)
+    links = creased.links[np.isin(edge_keys(creased.links), edge_keys(half_edges(faces)))]
+    kept = np.zeros(len(space), dtype=bool)
+    kept[creased.cell[creased.corner][: int(MAX_KEPT * n_vertices)]] = True
+    return diagram, cells, (space, faces, links, kept)
+
+
+def _from_input(plain: Surface) -> _Linked:
+    return plain.points, plain.faces, np.zeros((0, 2), dtype=np.int64), np.zeros(plain.n_points, dtype=bool)
 
 
 def _with_enough_sites(
@@ -200,7 +253,7 @@ def _with_enough_sites(
 
 def _untangled(
     points: Points, faces: Faces, links: Links, kept: PointMask, reference: ClosestPoints, stop: Stop
-) -> tuple[Points, Faces, Links, PointMask]:
+) -> _Linked:
     """Return the mesh with turned triangles mended, and the links and points to be kept that have not moved."""
     after, faces, _ = untangle(points, faces, reference, stop=stop)
     if after is points:
@@ -213,11 +266,11 @@ def _untangled(
 
 
 def _without_crossings(
-    points: Points, faces: Faces, links: Links, n_vertices: int, reference: ClosestPoints, stop: Stop
+    points: Points, faces: Faces, links: Links, n_vertices: int, reference: ClosestPoints, tries: int, stop: Stop
 ) -> tuple[Points, Faces]:
     """Return the mesh with intersecting triangles taken apart, and back at no more points than before if possible."""
     n_wanted = max(n_vertices, len(points))
-    points, faces, crossing = separate(points, faces, reference, stop=stop)
+    points, faces, crossing = separate(points, faces, reference, max_tries=tries, stop=stop)
     for _ in range(_MAX_TRIMS):
         if len(points) <= n_wanted:
             break

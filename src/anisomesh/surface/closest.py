@@ -18,6 +18,7 @@ _ON_SIDE = 1e-6
 _BLOCK = 16_384  # queries at a time, so that the memory in between is bounded
 _MARGIN = 0.01  # of the square root of twice the area of a triangle
 _CLEAR = 1e-3  # least cosine between normals that agree clearly
+_NO_SIDE = 1e-9  # length of a sum of unit normals that is rounding alone
 _SAME_SHEET = 1e-7  # of the diagonal: sheets so near to each other lie on each other
 
 Vectors = npt.NDArray[np.float64]
@@ -50,7 +51,7 @@ class ClosestPoints:
         """Return the normal of the surface at the closest point to each query (n, 3), of any length.
 
         Inside a facet that is the facet's normal, on an edge the sum of the unit normals of the faces there, at a
-        point their sum weighted by the angles at the point.
+        point their sum weighted by the angles at the point. On an edge whose faces lie on each other it is zero.
 
         References
         ----------
@@ -186,7 +187,12 @@ def squared_distances_to(corners: Vectors, points: Vectors) -> npt.NDArray[np.fl
 def _summed(
     target: npt.NDArray[np.int32], weight: npt.NDArray[np.float64], normals: Vectors, size: int
 ) -> npt.NDArray[np.float64]:
-    """Return the face normals summed over the edges or points (F, 3) of the faces, with weights (F, 3)."""
+    """Return the face normals summed over the edges or points (F, 3) of the faces, with weights (F, 3).
+
+    Sums that are rounding alone, where faces lie on each other and face opposite ways, are zero.
+    """
     terms = weight[:, :, None] * normals[:, None, :]
     columns = [np.bincount(target.ravel(), terms[:, :, axis].ravel(), minlength=size) for axis in range(3)]
-    return np.stack(columns, axis=1)
+    sums = np.stack(columns, axis=1)
+    sums[np.linalg.norm(sums, axis=1) < _NO_SIDE] = 0.0
+    return sums

@@ -1,0 +1,59 @@
+"""Where triangles of the dual are turned or intersect, and sites there."""
+
+from __future__ import annotations
+
+import numpy as np
+import numpy.typing as npt
+from scipy.spatial import cKDTree
+
+from anisomesh._arrays import EmbeddedPoints, Faces, Points, Sites
+from anisomesh.cvt.voronoi import RestrictedVoronoi
+from anisomesh.evaluation.validity import crossing_facets, new_intersections
+from anisomesh.surface.closest import ClosestPoints
+from anisomesh.surface.intersections import self_intersections
+from anisomesh.surface.mesh import Surface
+
+_APART = 0.1  # distances between sites that a new one is from others, at least
+
+
+def faulty_faces(points: Points, faces: Faces, reference: ClosestPoints) -> npt.NDArray[np.int64]:
+    """Return the faces (n,) of a mesh that are turned against the reference, or intersect where it does not."""
+    turned = np.flatnonzero(reference.turned(points[faces]))
+    mesh = Surface(points, faces)
+    if len(self_intersections(mesh)) == 0:  # most often, and without a search for those of the reference
+        return turned
+    return np.union1d(turned, new_intersections(mesh, crossing_facets(reference.surface)))
+
+
+def points_at_faults(
+    corners: npt.NDArray[np.float64],
+    reference: ClosestPoints,
+    voronoi: RestrictedVoronoi,
+    sites: Sites,
+    spacing: float,
+) -> EmbeddedPoints:
+    """Return points of the embedded surface (m, d) at triangles, to become sites.
+
+    Parameters
+    ----------
+    corners
+        The triangles in space (n, 3, 3).
+    reference
+        The surface in space, its faces in the order of ``voronoi``.
+    voronoi
+        The diagram over the embedded surface.
+    sites
+        Those that there are (S, d).
+    spacing
+        Distance between them.
+
+    Notes
+    -----
+    The points are those closest to corners, middles of edges and barycentres, less those that would be near others.
+    """
+    places = np.concatenate([corners, 0.5 * (corners + corners[:, [1, 2, 0]]), corners.mean(axis=1, keepdims=True)], 1)
+    facet, weights = reference.locate(places.reshape(-1, 3))
+    points = np.einsum("nc,ncd->nd", weights, voronoi.points[voronoi.faces[facet]])
+    points = points[cKDTree(sites).query(points)[0] > _APART * spacing]
+    near = cKDTree(points).query_pairs(_APART * spacing, output_type="ndarray")
+    return np.delete(points, near[:, 1], axis=0)  # the later one of each pair
