@@ -7,8 +7,10 @@ from dual_cases import assert_closed_manifold, mended
 
 from anisomesh.cvt.optimise import lloyd
 from anisomesh.cvt.voronoi import RestrictedVoronoi
+from anisomesh.dual import refine
 from anisomesh.dual.cells import cells_of
 from anisomesh.evaluation.distance import surface_distance
+from anisomesh.evaluation.validity import check_validity
 from anisomesh.surface import shapes, topology
 from anisomesh.surface.mesh import Surface
 
@@ -97,3 +99,39 @@ def test_more_creases_than_vertices_do_not_cost_what_is_beside_them():
     assert (mesh.n_points, result.from_input) == (200, False)
     assert mesh.edge_lengths.max() < 1.0  # the waves are 1 wide
     assert surface_distance(mesh, sheet).rms < 0.02
+
+
+@pytest.mark.parametrize("width", [0.005, 0.001])
+def test_creases_close_together_do_not_draw_rows_of_sites(width):
+    """Regression: of two creases near each other only one had a site, and the next went right beside it, and so on."""
+    sheet = shapes.open_patch(lambda x, y: 0.0 * x, n=16)
+    points = sheet.points.copy()
+    points[np.isclose(points[:, 0], 0.0), 0] = -0.5 * width
+    points[np.isclose(points[:, 0], 0.125), 0] = 0.5 * width
+    points[:, 2] = -np.maximum(np.abs(points[:, 0]) - 0.5 * width, 0.0)  # a roof with a narrow top
+    voronoi = RestrictedVoronoi(points, sheet.faces)
+    sites = lloyd(voronoi, naive.random_sites(points, sheet.faces, 200, np.random.default_rng(1)), 10)
+    result = mended(voronoi, sites, Surface(points, voronoi.faces), crease_angle=30.0, always=True)
+    assert result.inserted < 30
+    assert Surface(result.points, result.faces).edge_lengths.min() > 0.03  # the sites are about 0.17 apart
+
+
+def test_more_sites_where_triangles_intersect(monkeypatch):
+    """Folds near each other that triangles of this size cut through."""
+    sheet = shapes.open_patch(lambda x, y: 0.0 * x, n=64)
+    u, v = 2.0 * (sheet.points[:, 0] + 1.0), sheet.points[:, 1]
+    z = np.cos(np.pi * u)
+    folds = sheet.with_points(np.stack([0.1 * u + 0.3 * np.sin(2.0 * v) + 0.2 * np.sin(2.0 * z), v, z], axis=1))
+    voronoi = RestrictedVoronoi(folds.points, folds.faces)
+    sites = lloyd(voronoi, naive.random_sites(folds.points, folds.faces, 120, np.random.default_rng(0)), 3)
+
+    def faults():
+        result = mended(voronoi, sites, Surface(folds.points, voronoi.faces))
+        validity = check_validity(Surface(result.points, result.faces), folds)
+        assert len(result.points) == 120
+        assert (validity.euler, validity.nonmanifold_edges) == (1, 0)
+        return validity.flipped + validity.self_intersections
+
+    assert faults() == 0
+    monkeypatch.setattr(refine, "_MAX_REPEATS", 0)
+    assert faults() > 0

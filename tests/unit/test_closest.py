@@ -62,6 +62,21 @@ def test_a_triangle_on_two_sheets_that_lie_on_each_other_faces_one_of_them():
     assert closest.turned(outside[:, ::-1]).all()
 
 
+@pytest.mark.parametrize("seed", range(8))
+def test_no_triangle_is_turned_against_a_fold_or_at_a_right_angle(seed):
+    """Regression: the sum of opposite normals is rounding, and so is the product of normals at a right angle."""
+    turn = np.linalg.qr(np.random.default_rng(seed).normal(size=(3, 3)))[0]
+    fold = np.array([[0.0, 0, 0], [1, 0, 0], [0.3, 1, 0], [0.6, 1, 0]]) @ turn
+    closest = ClosestPoints(Surface(fold, np.array([[0, 1, 2], [1, 0, 3]])))
+    beyond = np.array([[[0.4, -0.5, -0.1], [0.6, -0.5, -0.1], [0.5, -0.5, 0.3]]]) @ turn
+    flat = ClosestPoints(Surface(fold, np.array([[0, 1, 2]])))
+    upright = np.array([[[0.4, 0.2, 0.1], [0.5, 0.3, 0.1], [0.5, 0.3, 0.3]]]) @ turn
+    for case, triangle in ((closest, beyond), (flat, upright)):
+        assert not case.turned(triangle).any()
+        assert not case.turned(triangle[:, ::-1]).any()
+        assert not case.clearly_facing(triangle).any()
+
+
 def test_distance_to_triangles_is_that_of_dense_samples():
     rng = np.random.default_rng(0)
     corners, points = rng.normal(size=(40, 3, 3)), rng.normal(size=(40, 3))

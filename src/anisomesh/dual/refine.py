@@ -127,7 +127,7 @@ def refine(
     7. Triangles that intersect where the surface does not are taken apart; points that this takes are made up for by
        collapses elsewhere.
     8. Where triangles are turned or intersect all the same, more sites are put, and all is done once more, twice at
-       most. So the mesh has more vertices there, and fewer elsewhere.
+       most. So the mesh has more vertices there, and fewer elsewhere; more in all only if it is valid then.
 
     Where step 1 or 2 does not succeed (a tube thinner than the distance between sites) the surface itself, which is
     valid, is coarsened by the same collapses. The paper inserts sites for every defect and optimises again; that makes
@@ -153,7 +153,8 @@ def refine(
         sites = np.concatenate([sites, points_at_faults(places, reference, voronoi, sites, features.creases.spacing)])
         trial = _refined(task, sites, n_start)
         bad = faulty_faces(trial.points, trial.faces, reference)
-        if len(bad) < len(faulty):
+        as_few = len(trial.points) <= max(n_vertices, len(best.points))
+        if len(bad) == 0 or (len(bad) < len(faulty) and as_few):
             best, faulty = trial, bad
     return best
 

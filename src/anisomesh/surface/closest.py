@@ -18,7 +18,7 @@ _ON_SIDE = 1e-6
 _BLOCK = 16_384  # queries at a time, so that the memory in between is bounded
 _MARGIN = 0.01  # of the square root of twice the area of a triangle
 _CLEAR = 1e-3  # least cosine between normals that agree clearly
-_NO_SIDE = 1e-9  # length of a sum of unit normals that is rounding alone
+_ROUNDING = 1e-9  # of cosines, and of sums of unit normals
 _SAME_SHEET = 1e-7  # of the diagonal: sheets so near to each other lie on each other
 
 Vectors = npt.NDArray[np.float64]
@@ -74,11 +74,11 @@ class ClosestPoints:
     def turned(self, corners: Vectors) -> FaceMask:
         """Return which triangles (n, 3, 3) face away from the surface where it is closest to their barycentre.
 
-        A triangle without area is not turned. Where two sheets of the surface lie on each other and face opposite
+        A triangle without area is not turned, nor is one at a right angle to the surface. Where two sheets of the surface lie on each other and face opposite
         ways, one of them is enough.
         """
         normals = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
-        return np.asarray(self._cosines(normals, corners.mean(axis=1)) < 0.0)
+        return np.asarray(self._cosines(normals, corners.mean(axis=1)) < -_ROUNDING)
 
     def clearly_facing(self, corners: Vectors) -> FaceMask:
         """Return which triangles (n, 3, 3) are not turned by a margin.
@@ -194,5 +194,5 @@ def _summed(
     terms = weight[:, :, None] * normals[:, None, :]
     columns = [np.bincount(target.ravel(), terms[:, :, axis].ravel(), minlength=size) for axis in range(3)]
     sums = np.stack(columns, axis=1)
-    sums[np.linalg.norm(sums, axis=1) < _NO_SIDE] = 0.0
+    sums[np.linalg.norm(sums, axis=1) < _ROUNDING] = 0.0
     return sums
