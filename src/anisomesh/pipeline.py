@@ -265,6 +265,8 @@ def _warnings(
         yield f"{surface.n_points:,} vertices instead of {n:,}: {why}"
     if validity.euler != validity.euler_input:
         yield f"the Euler characteristic is {validity.euler} instead of {validity.euler_input}; ask for more vertices"
+    if validity.flat:
+        yield f"{validity.flat:,} triangles have no area"
     if validity.flipped:
         yield f"{validity.flipped:,} triangles are turned against the input surface"
     if validity.new_intersections:

@@ -127,12 +127,15 @@ def test_the_mesh_does_not_leave_the_surface():
     assert not reference.turned(result.points[result.faces]).any()
 
 
+@pytest.mark.parametrize("kept", [[], [[0, 2]], [[0, 1], [1, 2], [2, 0]]])
 @pytest.mark.parametrize("height", [0.0, 1e-16, -1e-16])
-def test_a_triangle_without_area_on_a_straight_boundary_is_flipped_away(height):
+def test_a_triangle_without_area_on_a_straight_boundary_is_flipped_away(height, kept):
+    """Also on a crease: where its longest side was an edge to be kept it stayed."""
     points = np.array([[0.0, 0.0, 0.0], [0.5, height, 0.0], [1.0, 0.0, 0.0], [0.5, 0.8, 0.0]])
     faces = np.array([[0, 1, 2], [0, 2, 3]], dtype=np.int32)
     plane = open_patch(lambda x, y: 0.0 * x, n=4)
-    changed = flip_for_shape(points, faces, identity(4), ClosestPoints(plane))
+    kept = np.array(kept, dtype=np.int64).reshape(-1, 2)
+    changed = flip_for_shape(points, faces, identity(4), ClosestPoints(plane), kept=kept)
     surface = Surface(points, changed)
     assert surface.face_areas.min() == pytest.approx(0.2)
     np.testing.assert_allclose(surface.face_normals, np.tile([0.0, 0.0, 1.0], (2, 1)), atol=1e-12)

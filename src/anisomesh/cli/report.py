@@ -95,6 +95,7 @@ def describe_validity(validity: dict[str, Any]) -> str:
         counted(edges, "non-manifold edge") if edges else "",
         counted(vertices, "non-manifold vertex", "non-manifold vertices") if vertices else "",
         "" if validity["oriented"] else "not consistently oriented",
+        counted(validity["flat"], "flat triangle") if validity.get("flat") else "",
         counted(validity["flipped"], "flipped triangle") if validity.get("flipped") else "",
     ]
     return ", ".join(part for part in parts if part)

@@ -10,6 +10,7 @@ from anisomesh._arrays import EmbeddedPoints, Faces, Points, Sites
 from anisomesh.cvt.voronoi import RestrictedVoronoi
 from anisomesh.evaluation.validity import crossing_facets, new_intersections
 from anisomesh.surface.closest import ClosestPoints
+from anisomesh.surface.geometry import is_flat
 from anisomesh.surface.intersections import self_intersections
 from anisomesh.surface.mesh import Surface
 
@@ -17,12 +18,12 @@ _APART = 0.1  # distances between sites that a new one is from others, at least
 
 
 def faulty_faces(points: Points, faces: Faces, reference: ClosestPoints) -> npt.NDArray[np.int64]:
-    """Return the faces (n,) of a mesh that are turned against the reference, or intersect where it does not."""
-    turned = np.flatnonzero(reference.turned(points[faces]))
+    """Return the faces (n,) of a mesh that are flat, turned against the reference, or intersect where it does not."""
+    bad = np.flatnonzero(is_flat(points[faces]) | reference.turned(points[faces]))
     mesh = Surface(points, faces)
     if len(self_intersections(mesh)) == 0:  # most often, and without a search for those of the reference
-        return turned
-    return np.union1d(turned, new_intersections(mesh, crossing_facets(reference.surface)))
+        return bad
+    return np.union1d(bad, new_intersections(mesh, crossing_facets(reference.surface)))
 
 
 def points_at_faults(

@@ -18,9 +18,8 @@ _MAX_ROUNDS = 20
 _MIN_GAIN = 1e-3  # of the sum of the qualities of the two triangles
 _MAX_TURN = 30.0  # degrees between the normals of the triangles before and after
 _SLACK = 0.01  # edge lengths by which the new edge may be farther from the surface than the old one
-_FLAT = 1e-8  # thickness below which a triangle has no area, and rounding decides where it faces
-_FLAT_QUALITY = -2.0  # of such a triangle: no gain elsewhere makes up for one
-_FLAT_SLACK = 0.05  # the same as the other slack, to be rid of one
+_FLAT_QUALITY = -2.0  # of a triangle without area: no gain elsewhere makes up for one
+_FLAT_SLACK = 0.25  # the same as the other slack, to be rid of one
 
 Ints = npt.NDArray[np.int64]
 
@@ -95,7 +94,7 @@ def flip_for_shape(
     reference
         The surface that the mesh stands for.
     kept
-        Edges (n, 2) that stay.
+        Edges (n, 2) that stay, but for the longest side of a triangle without area: the other two are the same line.
 
     Notes
     -----
@@ -110,7 +109,7 @@ def flip_for_shape(
     for _ in range(_MAX_ROUNDS):
         surface = Surface(points, faces)
         edges = np.unique(surface.face_edges[active])
-        edges = edges[~np.isin(edge_keys(surface.edges[edges]), keys)]
+        edges = edges[~np.isin(edge_keys(surface.edges[edges]), keys) | np.isin(edges, _sides_of_flat(surface))]
         flips = possible_flips(surface, edges)
         before, after = (
             _quality(points, triangles.reshape(-1, 3), roots).reshape(-1, 2).sum(axis=1)
@@ -128,14 +127,16 @@ def flip_for_shape(
     return faces
 
 
-def _is_flat(points: Points, triangles: Ints) -> npt.NDArray[np.bool_]:
-    """Return which triangles (n, 3) have no area to speak of."""
-    return np.asarray(geometry.thickness(points[triangles]) < _FLAT)
+def _sides_of_flat(surface: Surface) -> Ints:
+    """Return the longest sides of the triangles without area, as numbers of edges (n,)."""
+    sides = surface.face_edges[geometry.is_flat(surface.points[surface.faces])]
+    longest = np.argmax(surface.edge_lengths[sides], axis=1)
+    return np.asarray(sides[np.arange(len(sides)), longest], dtype=np.int64)
 
 
 def _quality(points: Points, triangles: Ints, roots: PointTensors) -> npt.NDArray[np.float64]:
     """Return the qualities of triangles (n, 3) in the metric."""
-    return np.where(_is_flat(points, triangles), _FLAT_QUALITY, anisotropic_quality(points, triangles, roots))
+    return np.where(geometry.is_flat(points[triangles]), _FLAT_QUALITY, anisotropic_quality(points, triangles, roots))
 
 
 def _keeps_surface(surface: Surface, flips: Flips, reference: ClosestPoints) -> npt.NDArray[np.bool_]:
@@ -143,7 +144,7 @@ def _keeps_surface(surface: Surface, flips: Flips, reference: ClosestPoints) -> 
     points = surface.points
     normals = geometry.unit(geometry.face_cross(points, flips.triangles.reshape(-1, 3))).reshape(-1, 2, 3)
     cosine = np.einsum("nix,njx->nij", normals, surface.face_normals[flips.pair])
-    flat = _is_flat(points, surface.faces[flips.pair].reshape(-1, 3)).reshape(-1, 1, 2)
+    flat = geometry.is_flat(points[surface.faces[flips.pair]].reshape(-1, 3, 3)).reshape(-1, 1, 2)
     cosine[np.broadcast_to(flat, cosine.shape)] = 1.0
     allowed = np.asarray(cosine.min(axis=(1, 2)) > np.cos(np.radians(_MAX_TURN)))
     some = flips.take(allowed)

@@ -9,6 +9,7 @@ import numpy as np
 
 from anisomesh._arrays import FaceMask
 from anisomesh.surface.closest import ClosestPoints
+from anisomesh.surface.geometry import is_flat
 from anisomesh.surface.intersections import Pairs, self_intersections
 from anisomesh.surface.mesh import Surface
 from anisomesh.surface.topology import (
@@ -23,7 +24,7 @@ from anisomesh.surface.topology import (
 
 @dataclass(frozen=True, kw_only=True)
 class Validity:
-    """What a remesh is, topologically, and how many of its triangles face the wrong way.
+    """What a remesh is, topologically, and how many of its triangles are flat or face the wrong way.
 
     Attributes
     ----------
@@ -39,6 +40,8 @@ class Validity:
         Edges with more than two faces; vertices whose faces do not form one fan.
     oriented
         Whether faces that share an edge agree on their side.
+    flat
+        Number of triangles without area, see :func:`~anisomesh.surface.geometry.is_flat`.
     flipped
         Number of triangles that face away from the input, see :func:`flipped_faces`.
     self_intersections, self_intersections_input
@@ -58,6 +61,7 @@ class Validity:
     nonmanifold_edges: int
     nonmanifold_vertices: int
     oriented: bool
+    flat: int
     flipped: int
     self_intersections: int
     self_intersections_input: int
@@ -69,7 +73,7 @@ class Validity:
 
 
 def check_validity(result: Surface, reference: Surface) -> Validity:
-    """Return the topology of a remesh, beside that of its input, and count its flipped triangles.
+    """Return the topology of a remesh, beside that of its input, and count its flat and flipped triangles.
 
     Parameters
     ----------
@@ -91,6 +95,7 @@ def check_validity(result: Surface, reference: Surface) -> Validity:
         nonmanifold_edges=count_nonmanifold_edges(result.faces),
         nonmanifold_vertices=count_nonmanifold_points(result.faces),
         oriented=is_oriented(result.faces),
+        flat=int(is_flat(result.points[result.faces]).sum()),
         flipped=int(flipped_faces(result, reference).sum()),
         self_intersections=len(self_intersections(result)),
         self_intersections_input=len(pairs_input),

@@ -74,8 +74,8 @@ class ClosestPoints:
     def turned(self, corners: Vectors) -> FaceMask:
         """Return which triangles (n, 3, 3) face away from the surface where it is closest to their barycentre.
 
-        A triangle without area is not turned, nor is one at a right angle to the surface. Where two sheets of the surface lie on each other and face opposite
-        ways, one of them is enough.
+        A triangle without area is not turned, nor is one at a right angle to the surface. Where two sheets of the
+        surface lie on each other and face opposite ways, one of them is enough.
         """
         normals = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
         return np.asarray(self._cosines(normals, corners.mean(axis=1)) < -_ROUNDING)
@@ -193,6 +193,6 @@ def _summed(
     """
     terms = weight[:, :, None] * normals[:, None, :]
     columns = [np.bincount(target.ravel(), terms[:, :, axis].ravel(), minlength=size) for axis in range(3)]
-    sums = np.stack(columns, axis=1)
+    sums: Vectors = np.stack(columns, axis=1).astype(np.float64)
     sums[np.linalg.norm(sums, axis=1) < _ROUNDING] = 0.0
     return sums

@@ -11,6 +11,8 @@ import numpy.typing as npt
 
 from anisomesh._arrays import Faces, FaceVectors, Points, PointVectors, Vector3
 
+_FLAT = 1e-8  # thickness below which a triangle has no area to speak of
+
 
 def face_cross(points: Points, faces: Faces) -> FaceVectors:
     """Return the cross product of two sides of each face (F, 3): normal times twice the area."""
@@ -30,6 +32,11 @@ def thickness(corners: npt.NDArray[np.float64]) -> npt.NDArray[np.float64]:
     area = 0.5 * np.linalg.norm(np.cross(sides[:, 0], sides[:, 1]), axis=1)
     longest = (sides**2).sum(axis=2).max(axis=1)
     return np.asarray(np.divide(area, longest, out=np.zeros_like(area), where=longest > 0.0))
+
+
+def is_flat(corners: npt.NDArray[np.float64]) -> npt.NDArray[np.bool_]:
+    """Return which triangles (n, 3, 3) are less than 1e-8 thick, so without area: rounding decides where they face."""
+    return np.asarray(thickness(corners) < _FLAT)
 
 
 def corner_angles(corners: npt.NDArray[np.float64]) -> npt.NDArray[np.float64]:
