@@ -242,6 +242,15 @@ def test_polygon_index_finds_every_polygon_and_nothing_else():
     np.testing.assert_array_equal(diagram.site[found[found >= 0]], site[found >= 0])
 
 
+def test_point_at_is_the_corner_that_a_vertex_is():
+    points, faces, sites = make("torus", 3, 12, 0)
+    diagram = RestrictedVoronoi(points, faces).diagram(sites)
+    point = diagram.point_at(np.arange(len(diagram.label)))
+    np.testing.assert_array_equal(point >= 0, (diagram.barycentric == 1.0).any(axis=1))
+    np.testing.assert_array_equal(diagram.positions[point >= 0], points[point[point >= 0]])
+    assert set(point[point >= 0]) == set(range(len(points)))
+
+
 def test_layout_and_writability_of_the_arrays_do_not_matter_and_compile_nothing_new():
     points, faces, sites = make("sphere", 3, 20, 0)
     plain = RestrictedVoronoi(points, faces).evaluate(sites)

@@ -94,6 +94,15 @@ class Diagram:
         """Return embedded positions (n, d) of points given by facet (n,) and barycentric coordinates (n, 3)."""
         return np.asarray(np.einsum("nc,ncd->nd", barycentric, self.points[self.faces[facet]]))
 
+    def point_at(self, vertices: npt.NDArray[Any]) -> npt.NDArray[np.int64]:
+        """Return the point of the surface that each of these vertices (n,) is, -1 where a bisector ends."""
+        before, after = self.label[self.previous[vertices]], self.label[vertices]
+        result = np.full(len(vertices), -1, dtype=np.int64)
+        here = np.flatnonzero((before < 0) & (after < 0))
+        corner = 5 + before[here] + after[here]  # the one that neither side is opposite to: -1 - c each, and 3 in all
+        result[here] = self.faces[self.facet[self.polygon_of[vertices[here]]], corner]
+        return result
+
     def polygon_index(self, facet: npt.NDArray[Any], site: npt.NDArray[Any]) -> npt.NDArray[np.int64]:
         """Return the polygon of each (facet, site) pair, -1 where the cell does not reach the facet."""
         keys = self.facet.astype(np.int64) * len(self.sites) + self.site

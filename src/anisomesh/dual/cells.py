@@ -116,12 +116,10 @@ def _euler(diagram: Diagram, of_polygon: Ints, n: int, face_neighbours: FaceIndi
     facet = diagram.facet[diagram.polygon_of[side]]
     shared = np.zeros(len(diagram.label), dtype=bool)
     shared[side] = face_neighbours[facet, -1 - diagram.label[side]] >= 0
-    before = diagram.label[diagram.previous[side]]
-    at_corner = before < 0
-    corner = diagram.faces[facet[at_corner], 5 + before[at_corner] + diagram.label[side[at_corner]]]
+    point = diagram.point_at(side)
     valence = np.bincount(diagram.faces.ravel(), minlength=len(diagram.points))
     vertex = np.where(shared | shared[diagram.previous], 0.5, 1.0)
-    vertex[side[at_corner]] = 1.0 / valence[corner]
+    vertex[side[point >= 0]] = 1.0 / valence[point[point >= 0]]
     vertex -= np.where(shared, 0.5, 1.0)  # the edge that leaves it
     euler = np.bincount(of_polygon, np.bincount(diagram.polygon_of, vertex) + 1.0, minlength=n)
     return np.asarray(np.rint(euler), dtype=np.int32)

@@ -125,19 +125,9 @@ def _patches(diagram: Diagram, cells: Cells, surface: Surface, chosen: Indices) 
     pair = number[np.stack([polygon, diagram.polygon_index(across, diagram.site[polygon])], axis=1)]
     gate = diagram.at(facet, 0.5 * (diagram.barycentric[edge] + diagram.barycentric[following]))
     length = np.linalg.norm(centre[pair] - gate[:, None], axis=2).sum(axis=1)
-    ends = np.stack([_vertex_at(diagram, surface, end) for end in (edge, following)], axis=1)
+    ends = np.stack([diagram.point_at(end) for end in (edge, following)], axis=1)
+    ends[(ends >= 0) & surface.on_boundary[ends]] = -1
     return _Patches(cell=cell[kept], centre=centre, pair=pair, gate=gate, length=length, ends=ends)
-
-
-def _vertex_at(diagram: Diagram, surface: Surface, corner: npt.NDArray[Any]) -> Indices:
-    """Return the vertex of the surface that corners of polygons (n,) are, -1 for a bisector and for the boundary."""
-    before, after = diagram.label[diagram.previous[corner]], diagram.label[corner]
-    found = np.full(len(corner), -1, dtype=np.int64)
-    here = np.flatnonzero((before < 0) & (after < 0))
-    facet = diagram.facet[diagram.polygon_of[corner[here]]]
-    vertex = diagram.faces[facet, 5 + before[here] + after[here]]
-    found[here] = np.where(surface.on_boundary[vertex], -1, vertex)
-    return found
 
 
 def _nearest(patches: _Patches, points: EmbeddedPoints) -> Indices:

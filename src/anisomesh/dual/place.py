@@ -162,11 +162,10 @@ def _planes(diagram: Diagram, cells: Cells, surface: Surface) -> npt.NDArray[np.
 
 def _owners(diagram: Diagram, cells: Cells, surface: Surface) -> npt.NDArray[np.int64]:
     """Return the cell that each point of the surface (V,) is in, -1 for points without faces."""
-    before, after = diagram.label[diagram.previous], diagram.label
-    at_point = np.flatnonzero((before < 0) & (after < 0))
-    polygon = diagram.polygon_of[at_point]
+    side = np.flatnonzero(diagram.label < 0)
+    point = diagram.point_at(side)
     owner = np.full(surface.n_points, -1, dtype=np.int64)
-    owner[diagram.faces[diagram.facet[polygon], 5 + before[at_point] + after[at_point]]] = cells.of_polygon[polygon]
+    owner[point[point >= 0]] = cells.of_polygon[diagram.polygon_of[side[point >= 0]]]
     return owner
 
 
