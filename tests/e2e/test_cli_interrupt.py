@@ -17,6 +17,7 @@ from conftest import CLI
 def test_interrupt_leaves_no_file(large_torus_obj, tmp_path):
     words = ["remesh", str(large_torus_obj), "-o", str(tmp_path / "out.ply"), "-n", "9000"]
     words += ["--report", str(tmp_path / "report.json")]
+    before = signal.signal(signal.SIGINT, signal.default_int_handler)  # a signal ignored here the child would ignore
     with subprocess.Popen(
         [*CLI, *words],
         stdout=subprocess.PIPE,
@@ -24,6 +25,7 @@ def test_interrupt_leaves_no_file(large_torus_obj, tmp_path):
         text=True,
         env={**os.environ, "OMP_NUM_THREADS": "1"},
     ) as process:
+        signal.signal(signal.SIGINT, before)
         watchdog = threading.Timer(240, process.kill)
         watchdog.start()
         seen = []
