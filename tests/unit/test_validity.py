@@ -103,7 +103,12 @@ def test_facets_on_either_side_of_a_crest_are_equally_good(degrees):
         assert not flipped_faces(steep, roof).any()
 
 
-def test_triangle_without_area_is_not_flipped():
+@pytest.mark.parametrize("size", [1e-9, 1.0, 1e9])
+def test_triangle_without_area_is_flat_and_not_flipped(size):
     ball = sphere(2)
-    line = Surface(np.array([[1.0, 0, 0], [1, 0.1, 0], [1, 0.2, 0]]), np.array([[0, 1, 2]]))
+    line = Surface(size * np.array([[1.0, 0, 0], [1, 0.1, 0], [1, 0.2, 0]]), np.array([[0, 1, 2]]))
+    ball = ball.with_points(size * ball.points)
     assert not flipped_faces(line, ball).any()
+    validity = check_validity(line, ball)
+    assert (validity.flat, validity.flipped) == (1, 0)
+    assert check_validity(ball, ball).flat == 0

@@ -1,4 +1,4 @@
-"""Where triangles of the dual are turned or intersect, and sites there."""
+"""Where triangles of the dual are turned, flat or intersect, and sites there."""
 
 from __future__ import annotations
 

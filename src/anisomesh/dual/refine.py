@@ -39,7 +39,7 @@ MAX_ROUNDS = 20
 _MAX_TRIMS = 3
 _TRIM_TRIES = 50
 _TRIES, _TRIES_COARSENED = 300, 1_000  # pairs of triangles looked at, and of those of coarsened input
-_MAX_REPEATS = 2  # with more sites where triangles are turned or intersect
+_MAX_REPEATS = 2  # with more sites where triangles are turned, flat or intersect
 MAX_SHARE = 0.25  # of cells that are no disks; with more the sites are too few for this surface
 MAX_CREASE_SHARE = 0.5  # of the vertices asked for: sites added on creases
 MAX_KEPT = 0.5  # of the vertices asked for: corners that collapses leave alone
@@ -126,8 +126,8 @@ def refine(
     6. Edges are flipped where that gives better triangles in the metric, and the longest split if points are missing.
     7. Triangles that intersect where the surface does not are taken apart; points that this takes are made up for by
        collapses elsewhere.
-    8. Where triangles are turned or intersect all the same, more sites are put, and all is done once more, twice at
-       most. So the mesh has more vertices there, and fewer elsewhere; more in all only if it is valid then.
+    8. Where triangles are turned, flat or intersect all the same, more sites are put, and all is done once more, twice
+       at most. So the mesh has more vertices there, and fewer elsewhere; more in all only if it is valid then.
 
     Where step 1 or 2 does not succeed (a tube thinner than the distance between sites) the surface itself, which is
     valid, is coarsened by the same collapses. The paper inserts sites for every defect and optimises again; that makes
@@ -137,8 +137,8 @@ def refine(
     it says; each cut of step 3 shortens a path; each round of step 4 takes a point away; step 5 has a bound on rounds
     and keeps the best mesh met; each flip of step 6 raises a bounded sum, each split brings the number nearer; step 7
     has a bound on pairs looked at; of the repeats the best is kept. Steps 4 to 7 keep the topology, change by change.
-    So the mesh is a manifold with the topology of the surface however they end; turned triangles and intersections that
-    they leave are counted by :func:`anisomesh.evaluation.validity.check_validity`.
+    So the mesh is a manifold with the topology of the surface however they end; turned and flat triangles and
+    intersections that they leave are counted by :func:`anisomesh.evaluation.validity.check_validity`.
     """
     reference = ClosestPoints(surface)
     task = _Task(voronoi, surface, plain, features, scale, n_vertices, metric_root(tensors), reference, stop)
@@ -150,7 +150,10 @@ def refine(
         if len(bad) == 0 or trial.from_input or stop():
             break
         places = trial.points[trial.faces[bad]]
-        sites = np.concatenate([sites, points_at_faults(places, reference, voronoi, sites, features.creases.spacing)])
+        more = points_at_faults(places, reference, voronoi, sites, features.creases.spacing)
+        if len(more) == 0:
+            break
+        sites = np.concatenate([sites, more])
         trial = _refined(task, sites, n_start)
         bad = faulty_faces(trial.points, trial.faces, reference)
         as_few = len(trial.points) <= max(n_vertices, len(best.points))
