@@ -39,7 +39,7 @@ MAX_ROUNDS = 20
 _MAX_TRIMS = 3
 _TRIM_TRIES = 50
 _TRIES, _TRIES_COARSENED = 300, 1_000  # pairs of triangles looked at, and of those of coarsened input
-_MAX_REPEATS = 2  # with more sites where triangles are turned, flat or intersect
+_MAX_REPEATS = 4  # with more sites where triangles are turned, flat or intersect
 MAX_SHARE = 0.25  # of cells that are no disks; with more the sites are too few for this surface
 MAX_CREASE_SHARE = 0.5  # of the vertices asked for: sites added on creases
 MAX_KEPT = 0.5  # of the vertices asked for: corners that collapses leave alone
@@ -126,8 +126,8 @@ def refine(
     6. Edges are flipped where that gives better triangles in the metric, and the longest split if points are missing.
     7. Triangles that intersect where the surface does not are taken apart; points that this takes are made up for by
        collapses elsewhere.
-    8. Where triangles are turned, flat or intersect all the same, more sites are put, and all is done once more, twice
-       at most. So the mesh has more vertices there, and fewer elsewhere; more in all only if it is valid then.
+    8. Where triangles are turned, flat or intersect all the same, more sites are put, and all is done once more, four
+       times at most. So the mesh has more vertices there, and fewer elsewhere; more in all only if it is valid then.
 
     Where step 1 or 2 does not succeed (a tube thinner than the distance between sites) the surface itself, which is
     valid, is coarsened by the same collapses. The paper inserts sites for every defect and optimises again; that makes
