@@ -17,7 +17,7 @@ from anisomesh.surface.curves import Ints
 
 _NEAR = 0.1  # of the distance between sites: a site so near to a crease belongs to it
 _BEND = 1e-3  # of its chord that the middle of a curved arc is off it, at least
-_APART = 0.1  # distances between sites that a new one on an arc is from others, at least
+APART = 0.1  # distances between sites that a new one on an arc is from others, at least
 _SAME = 1e-6  # of the distance between sites: a place so near to a corner is the corner
 
 
@@ -93,7 +93,7 @@ def creased_cells(creases: Creases, arcs: CreaseArcs, rim: Arcs, cells: Cells, s
     wide = [k[np.argmax(arcs.length[k])] for k in inner if arcs.length[k].sum() > LONG * spacing]
     wide.sort(key=lambda k: -arcs.length[k])
     on_arcs = nearest[np.array(wide, dtype=np.int64)]
-    apart = cKDTree(sites).query(on_arcs)[0] > _APART * spacing
+    apart = cKDTree(sites).query(on_arcs)[0] > APART * spacing
     cell = np.flatnonzero((own >= 0) | (corner >= 0))
     start, end = (creases.curves.at(at[own[cell]], arcs.curve[own[cell]]) for at in (arcs.start, arcs.end))
     return CreasedCells(

@@ -7,14 +7,13 @@ import numpy.typing as npt
 from scipy.spatial import cKDTree
 
 from anisomesh._arrays import EmbeddedPoints, Faces, Points, Sites
-from anisomesh.cvt.voronoi import RestrictedVoronoi
+from anisomesh.cvt.diagram import Diagram
+from anisomesh.dual.creases import APART
 from anisomesh.evaluation.validity import crossing_facets, new_intersections
 from anisomesh.surface.closest import ClosestPoints
 from anisomesh.surface.geometry import is_flat
 from anisomesh.surface.intersections import self_intersections
 from anisomesh.surface.mesh import Surface
-
-_APART = 0.1  # distances between sites that a new one is from others, at least
 
 
 def faulty_faces(points: Points, faces: Faces, reference: ClosestPoints) -> npt.NDArray[np.int64]:
@@ -29,7 +28,7 @@ def faulty_faces(points: Points, faces: Faces, reference: ClosestPoints) -> npt.
 def points_at_faults(
     corners: npt.NDArray[np.float64],
     reference: ClosestPoints,
-    voronoi: RestrictedVoronoi,
+    diagram: Diagram,
     sites: Sites,
     spacing: float,
 ) -> EmbeddedPoints:
@@ -40,9 +39,9 @@ def points_at_faults(
     corners
         The triangles in space (n, 3, 3).
     reference
-        The surface in space, its faces in the order of ``voronoi``.
-    voronoi
-        The diagram over the embedded surface.
+        The surface in space, its faces in the order of the diagram.
+    diagram
+        A diagram over the embedded surface.
     sites
         Those that there are (S, d).
     spacing
@@ -54,7 +53,7 @@ def points_at_faults(
     """
     places = np.concatenate([corners, 0.5 * (corners + corners[:, [1, 2, 0]]), corners.mean(axis=1, keepdims=True)], 1)
     facet, weights = reference.locate(places.reshape(-1, 3))
-    points = np.einsum("nc,ncd->nd", weights, voronoi.points[voronoi.faces[facet]])
-    points = points[cKDTree(sites).query(points)[0] > _APART * spacing]
-    near = cKDTree(points).query_pairs(_APART * spacing, output_type="ndarray")
+    points = diagram.at(facet, weights)
+    points = points[cKDTree(sites).query(points)[0] > APART * spacing]
+    near = cKDTree(points).query_pairs(APART * spacing, output_type="ndarray")
     return np.delete(points, near[:, 1], axis=0)  # the later one of each pair

@@ -150,7 +150,7 @@ def refine(
         if len(bad) == 0 or trial.from_input or stop():
             break
         places = trial.points[trial.faces[bad]]
-        more = points_at_faults(places, reference, voronoi, sites, features.creases.spacing)
+        more = points_at_faults(places, reference, trial.diagram, sites, features.creases.spacing)
         if len(more) == 0:
             break
         sites = np.concatenate([sites, more])
@@ -224,6 +224,7 @@ def _dual(task: _Task, sites: Sites) -> tuple[Diagram, Cells, _Linked | None]:
 
 
 def _from_input(plain: Surface) -> _Linked:
+    """Return the surface itself, of which nothing is to be kept."""
     return plain.points, plain.faces, np.zeros((0, 2), dtype=np.int64), np.zeros(plain.n_points, dtype=bool)
 
 
