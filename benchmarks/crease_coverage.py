@@ -19,11 +19,11 @@ from scipy.spatial import cKDTree
 
 import anisomesh
 from anisomesh.evaluation.preservation import feature_preservation
+from anisomesh.features.detect import corners, sharp_edges
+from anisomesh.mesh.subdivision import split_long_edges
+from anisomesh.mesh.surface import Surface
 from anisomesh.options import EMBEDDINGS, RemeshOptions
-from anisomesh.surface.features import corners, sharp_edges
-from anisomesh.surface.mesh import Surface
-from anisomesh.surface.parts import sparse_parts
-from anisomesh.surface.subdivide import split_long_edges
+from anisomesh.shapes.parts import sparse_parts
 
 ANGLE = RemeshOptions().feature_angle
 REACH = 0.1  # mean edges of the result: a crease is covered where a bent edge of the result is so near

@@ -20,10 +20,10 @@ import numpy as np
 
 import anisomesh
 from anisomesh import Surface
-from anisomesh.surface.noise import with_noise
-from anisomesh.surface.parts import hollow_loft, sparse_parts
-from anisomesh.surface import shapes
-from anisomesh.surface.shapes import cylinder, ellipsoid, open_patch, sphere, torus, twisted_ring
+from anisomesh.mesh.noise import with_noise
+from anisomesh.shapes import analytic as shapes
+from anisomesh.shapes.analytic import cylinder, ellipsoid, open_patch, sphere, torus, twisted_ring
+from anisomesh.shapes.parts import hollow_loft, sparse_parts
 
 
 def saddle() -> Surface:
@@ -36,7 +36,7 @@ def several(*surfaces: Surface) -> Surface:
     points, faces, n_points, place = [], [], 0, 0.0
     for surface in surfaces:
         low, high = surface.points[:, 0].min(), surface.points[:, 0].max()
-        points.append(surface.points + [place - low, 0.0, 0.0])
+        points.append(surface.points + np.array([place - low, 0.0, 0.0]))
         faces.append(surface.faces + n_points)
         n_points += surface.n_points
         place += high - low + 0.2

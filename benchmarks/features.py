@@ -13,10 +13,10 @@ import numpy as np
 from scipy.spatial import cKDTree
 
 import anisomesh
-from anisomesh.surface.features import points_along, sharp_edges
-from anisomesh.surface.mesh import Surface
-from anisomesh.surface.shapes import cad_features, cad_part
-from anisomesh.surface.topology import edge_keys
+from anisomesh.features.detect import points_along, sharp_edges
+from anisomesh.mesh.surface import Surface
+from anisomesh.mesh.topology import edge_keys
+from anisomesh.shapes.analytic import cad_features, cad_part
 
 REACH = 0.1  # of the mean edge length: a point of a crease is covered if an edge of the result is so near
 BEND = 5.0  # and its faces differ by so many degrees at least

@@ -17,15 +17,15 @@ from typing import Any
 
 import numpy as np
 
-from anisomesh.batch.inputs import make_shape
+from anisomesh.bench.inputs import make_shape
 from anisomesh.embedding.direct import embed
+from anisomesh.io.meshes import load
 from anisomesh.isolation import isolated
-from anisomesh.learn.predict import predict
-from anisomesh.metric.tensor import compute_metric
-from anisomesh.surface.geometry import unit_frame
-from anisomesh.surface.io import load
-from anisomesh.surface.mesh import Surface
-from anisomesh.surface.prepare import prepare
+from anisomesh.learn.inference.predict import predict
+from anisomesh.mesh.geometry import unit_frame
+from anisomesh.mesh.surface import Surface
+from anisomesh.metric.tensors import compute_metric
+from anisomesh.repair.prepare import prepare
 
 SIZES = (1_000, 3_000, 10_000, 30_000, 100_000, 300_000, 1_000_000)
 STEPS = 10

@@ -17,14 +17,19 @@ import numpy as np
 import torch
 
 from anisomesh.embedding.direct import embed
-from anisomesh.learn.messages import largest_by_scatter, largest_of_neighbours, mean_by_scatter, mean_of_neighbours
-from anisomesh.learn.network import NetworkOptions, StretchNetwork
-from anisomesh.learn.paper import PaperNetwork, PaperOptions, seen_of
-from anisomesh.learn.predict import predict
-from anisomesh.learn.pyramid import N_EDGE, pyramid
-from anisomesh.metric.tensor import compute_metric
-from anisomesh.surface.mesh import Surface
-from anisomesh.surface.shapes import torus
+from anisomesh.learn.inference.predict import predict
+from anisomesh.learn.models.hierarchy import N_EDGE, pyramid
+from anisomesh.learn.models.messages import (
+    largest_by_scatter,
+    largest_of_neighbours,
+    mean_by_scatter,
+    mean_of_neighbours,
+)
+from anisomesh.learn.models.paper import PaperNetwork, PaperOptions, seen_of
+from anisomesh.learn.models.stretch import NetworkOptions, StretchNetwork
+from anisomesh.mesh.surface import Surface
+from anisomesh.metric.tensors import compute_metric
+from anisomesh.shapes.analytic import torus
 
 RUNS = 10
 CHANNELS = 64

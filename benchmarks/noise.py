@@ -14,13 +14,13 @@ import os
 import numpy as np
 
 import anisomesh
-from anisomesh.dataset.implicit import Blobs
-from anisomesh.dataset.make import Recipe, items_of_blobs
-from anisomesh.evaluation.distance import surface_distance
-from anisomesh.evaluation.quality import anisotropic_quality, transfer_metric_roots
-from anisomesh.metric.tensor import metric_root
-from anisomesh.surface.closest import ClosestPoints
-from anisomesh.surface.noise import with_noise
+from anisomesh.learn.data.make import Recipe, items_of_blobs
+from anisomesh.mesh.closest_points import ClosestPoints
+from anisomesh.mesh.distance import surface_distance
+from anisomesh.mesh.noise import with_noise
+from anisomesh.metric.quality import anisotropic_quality, transfer_metric_roots
+from anisomesh.metric.tensors import metric_root
+from anisomesh.shapes.implicit import Blobs
 
 FIRST_SEED = 1_000  # the data sets for training start at 0
 N_POINTS, N_VERTICES = 5_000, 1_000

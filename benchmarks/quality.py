@@ -17,7 +17,7 @@ from typing import Any
 import numpy as np
 
 import anisomesh
-from anisomesh.surface.topology import connected_components
+from anisomesh.mesh.topology import connected_components
 
 OUT = Path(__file__).parent / "out" / "quality.jsonl"
 

@@ -18,13 +18,13 @@ import numpy as np
 import numpy.typing as npt
 from scipy.spatial.transform import Rotation
 
-from anisomesh.batch.inputs import make_shape
-from anisomesh.learn.predict import predict
-from anisomesh.learn.shipped import shipped_weights
-from anisomesh.surface.geometry import unit_frame
-from anisomesh.surface.io import load
-from anisomesh.surface.mesh import Surface
-from anisomesh.surface.prepare import prepare
+from anisomesh.bench.inputs import make_shape
+from anisomesh.io.meshes import load
+from anisomesh.learn.inference.predict import predict
+from anisomesh.learn.inference.pretrained import shipped_weights
+from anisomesh.mesh.geometry import unit_frame
+from anisomesh.mesh.surface import Surface
+from anisomesh.repair.prepare import prepare
 
 SHAPES = ("ring:3000", "part:3000")
 MOST = 60_000  # points of a mesh

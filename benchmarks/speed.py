@@ -20,13 +20,13 @@ from scipy.spatial import cKDTree
 import anisomesh
 from anisomesh.cvt.optimise import lloyd, minimise
 from anisomesh.cvt.sampling import resample_by_energy, sample_surface
-from anisomesh.cvt.voronoi import Evaluation, RestrictedVoronoi
+from anisomesh.cvt.schedule import DENSITY_SHARPNESS
 from anisomesh.embedding.direct import embed
-from anisomesh.metric.tensor import compute_metric
-from anisomesh.schedule import DENSITY_SHARPNESS
-from anisomesh.surface.geometry import unit_frame
-from anisomesh.surface.mesh import Surface
-from anisomesh.surface.shapes import twisted_ring
+from anisomesh.mesh.geometry import unit_frame
+from anisomesh.mesh.surface import Surface
+from anisomesh.metric.tensors import compute_metric
+from anisomesh.shapes.analytic import twisted_ring
+from anisomesh.voronoi.restricted import Evaluation, RestrictedVoronoi
 
 
 def ring(n_points: int) -> Surface:
@@ -101,9 +101,9 @@ from speed import ring
 from anisomesh import remesh
 from anisomesh.cvt.optimise import lloyd, minimise
 from anisomesh.cvt.sampling import sample_surface
-from anisomesh.cvt.voronoi import RestrictedVoronoi
+from anisomesh.voronoi.restricted import RestrictedVoronoi
 from anisomesh.embedding.direct import embed
-from anisomesh.metric.tensor import compute_metric
+from anisomesh.metric.tensors import compute_metric
 
 def status(name):
     line = next(line for line in Path("/proc/self/status").read_text().splitlines() if line.startswith(name))
@@ -167,7 +167,7 @@ def main() -> None:
     print("import anisomesh:", fresh(code), "s")
     with tempfile.TemporaryDirectory() as cache:
         code = (
-            "import time; from anisomesh import remesh, sample; from anisomesh.surface.shapes import sphere\n"
+            "import time; from anisomesh import remesh, sample; from anisomesh.shapes.analytic import sphere\n"
             "s = sphere(3); t = time.perf_counter(); remesh(s, ratio=0.5); a = time.perf_counter() - t\n"
             "t = time.perf_counter(); remesh(s, ratio=0.5); print(a - (time.perf_counter() - t))"
         )

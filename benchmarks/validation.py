@@ -18,12 +18,12 @@ from pathlib import Path
 import numpy as np
 
 from anisomesh.estimate import DESIGNED
-from anisomesh.learn.items import Item, load_item
-from anisomesh.learn.manifest import files_of
-from anisomesh.learn.predict import predict
-from anisomesh.learn.shipped import shipped_weights
-from anisomesh.surface.features import share_of_flat_edges
-from anisomesh.surface.geometry import sums_at_points
+from anisomesh.features.detect import share_of_flat_edges
+from anisomesh.learn.data.items import Item, load_item
+from anisomesh.learn.data.manifest import files_of
+from anisomesh.learn.inference.predict import predict
+from anisomesh.learn.inference.pretrained import shipped_weights
+from anisomesh.mesh.geometry import sums_at_points
 from rotation import logarithm
 
 

@@ -10,8 +10,8 @@ import sys
 import numpy as np
 
 import anisomesh
-from anisomesh.picture import Panel, gallery
-from anisomesh.surface.shapes import torus
+from anisomesh.shapes.analytic import torus
+from anisomesh.viz import Panel, gallery
 
 
 def tube() -> anisomesh.Surface:

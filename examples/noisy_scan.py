@@ -10,8 +10,8 @@ import sys
 import numpy as np
 
 import anisomesh
-from anisomesh.picture import Panel, gallery
-from anisomesh.surface.noise import with_noise
+from anisomesh.mesh.noise import with_noise
+from anisomesh.viz import Panel, gallery
 
 NOISE = 0.3  # mean edge lengths
 N_VERTICES = 1_500

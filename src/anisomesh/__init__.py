@@ -15,13 +15,13 @@ from typing import TYPE_CHECKING, Any
 if TYPE_CHECKING:
     from anisomesh.errors import AnisomeshError, MeshError, MeshFileError, MetricError, OptionError
     from anisomesh.evaluation.report import Evaluation, evaluate
+    from anisomesh.io.meshes import load, save
+    from anisomesh.mesh.surface import Surface
     from anisomesh.options import RemeshOptions, StepInfo
-    from anisomesh.picture import side_by_side
     from anisomesh.pipeline import remesh
     from anisomesh.result import RemeshResult, save_rvd
-    from anisomesh.surface.io import load, save
-    from anisomesh.surface.mesh import Surface
-    from anisomesh.surface.shapes import sample
+    from anisomesh.shapes.analytic import sample
+    from anisomesh.viz import side_by_side
 
     __version__: str
 
@@ -56,14 +56,14 @@ _HOME = {
     "RemeshOptions": "options",
     "RemeshResult": "result",
     "StepInfo": "options",
-    "Surface": "surface.mesh",
+    "Surface": "mesh.surface",
     "evaluate": "evaluation.report",
-    "load": "surface.io",
+    "load": "io.meshes",
     "remesh": "pipeline",
-    "sample": "surface.shapes",
-    "save": "surface.io",
+    "sample": "shapes.analytic",
+    "save": "io.meshes",
     "save_rvd": "result",
-    "side_by_side": "picture",
+    "side_by_side": "viz",
 }
 
 

@@ -11,16 +11,16 @@ import numpy.typing as npt
 from anisomesh._arrays import EmbeddedPoints, PointTensors
 from anisomesh.embedding.base import Embedding
 from anisomesh.embedding.direct import embed
-from anisomesh.embedding.given import given_embedding
+from anisomesh.embedding.precomputed import given_embedding
+from anisomesh.features.detect import share_of_flat_edges
 from anisomesh.learn import require_torch, torch_is_there
-from anisomesh.learn.lines import directions_of, lines_in, tensors_of
+from anisomesh.mesh.subdivision import Refined
+from anisomesh.mesh.surface import Surface
 from anisomesh.metric.curvature import principal_curvatures
+from anisomesh.metric.line_field import directions_of, lines_in, tensors_of
 from anisomesh.metric.tangent import tangent_frames, unit_normals
-from anisomesh.metric.tensor import MetricName, compute_metric, curvature_metric
+from anisomesh.metric.tensors import MetricName, compute_metric, curvature_metric
 from anisomesh.options import RemeshOptions
-from anisomesh.surface.features import share_of_flat_edges
-from anisomesh.surface.mesh import Surface
-from anisomesh.surface.subdivide import Refined
 
 MEASURED_SHARE = 0.7
 """Of the measured curvature in the hybrid metric. On validation families 0.3 is worse, and 0.85 as good."""
@@ -97,7 +97,7 @@ def estimated(
     if kind == "direct":
         return Estimate(plain=plain, working=working, tensors=compute_metric(working, wanted).tensors, kind=kind)
     require_torch()
-    from anisomesh.learn.predict import predict
+    from anisomesh.learn.inference.predict import predict
 
     denoise = options.denoise and share_of_flat_edges(plain) < DESIGNED
     found = predict(working, options.weights, device=options.device, denoise=denoise)

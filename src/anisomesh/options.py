@@ -11,7 +11,7 @@ import numpy as np
 import numpy.typing as npt
 
 from anisomesh.errors import OptionError
-from anisomesh.metric.tensor import METRIC_NAMES, MetricName
+from anisomesh.metric.tensors import METRIC_NAMES, MetricName
 
 EMBEDDINGS = ("auto", "direct", "neural", "hybrid")
 DEVICES = ("cpu", "cuda")

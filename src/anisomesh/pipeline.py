@@ -13,27 +13,27 @@ import numpy as np
 import numpy.typing as npt
 
 from anisomesh._arrays import EdgeMask
-from anisomesh.clock import Clock
 from anisomesh.cvt.features import Features
 from anisomesh.cvt.optimise import Optimised, Status
-from anisomesh.cvt.voronoi import RestrictedVoronoi
-from anisomesh.dual.refine import Refined, refine
+from anisomesh.cvt.schedule import optimise
+from anisomesh.deadline import Clock
+from anisomesh.delaunay.refine import Refined, refine
 from anisomesh.errors import MetricError, OptionError, TimeLimitError
 from anisomesh.estimate import embedded, estimated
-from anisomesh.evaluation.validity import Validity, check_validity
+from anisomesh.features.detect import sharp_edges
+from anisomesh.features.tagged import edges_within, tagged_edges
+from anisomesh.io.convert import as_surface
 from anisomesh.memory import check_memory
-from anisomesh.metric.tensor import MetricName
+from anisomesh.mesh.geometry import unit_frame
+from anisomesh.mesh.surface import Surface
+from anisomesh.mesh.validity import Validity, check_validity
+from anisomesh.mesh.working_surface import working_surface
+from anisomesh.metric.tensors import MetricName
 from anisomesh.options import OnStep, RemeshOptions, StepInfo
+from anisomesh.repair.prepare import Prepared, prepare
 from anisomesh.result import RemeshResult
-from anisomesh.schedule import optimise
 from anisomesh.search import MIN_VERTICES, smallest_within
-from anisomesh.surface.convert import as_surface
-from anisomesh.surface.features import sharp_edges
-from anisomesh.surface.geometry import unit_frame
-from anisomesh.surface.mesh import Surface
-from anisomesh.surface.prepare import Prepared, prepare
-from anisomesh.surface.tagged import edges_within, tagged_edges
-from anisomesh.surface.working import working_surface
+from anisomesh.voronoi.restricted import RestrictedVoronoi
 
 COUNT_TOLERANCE = 0.02  # share of the asked vertices by which the result may differ without a warning
 OPTIMISATION_SHARE = 0.6  # of the time limit is for all up to the end of the optimisation

@@ -6,15 +6,16 @@ import os
 from dataclasses import dataclass
 from typing import Any
 
-from anisomesh.cvt.diagram import Diagram
 from anisomesh.cvt.optimise import Status
-from anisomesh.dual.cells import Cells
-from anisomesh.dual.polygons import PolygonMesh, polygon_mesh, save_polygons
 from anisomesh.embedding.base import Embedding
-from anisomesh.evaluation.validity import Validity
-from anisomesh.surface.geometry import Frame
-from anisomesh.surface.mesh import Surface
-from anisomesh.surface.prepare import PrepareReport
+from anisomesh.io.rvd import PolygonMesh, save_polygons
+from anisomesh.mesh.geometry import Frame
+from anisomesh.mesh.surface import Surface
+from anisomesh.mesh.validity import Validity
+from anisomesh.repair.prepare import PrepareReport
+from anisomesh.voronoi.cells import Cells
+from anisomesh.voronoi.diagram import Diagram
+from anisomesh.voronoi.polygons import polygon_mesh
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)

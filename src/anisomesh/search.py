@@ -6,11 +6,11 @@ from collections.abc import Callable
 from dataclasses import replace
 from math import exp, log
 
-from anisomesh.clock import Clock
+from anisomesh.deadline import Clock
 from anisomesh.errors import OptionError, TimeLimitError
-from anisomesh.evaluation.distance import surface_distance
+from anisomesh.mesh.distance import surface_distance
+from anisomesh.mesh.surface import Surface
 from anisomesh.result import RemeshResult
-from anisomesh.surface.mesh import Surface
 
 MIN_VERTICES = 4
 MAX_RUNS = 16

@@ -3,10 +3,10 @@
 import numpy as np
 import pytest
 
+from anisomesh.mesh.geometry import unit_frame
 from anisomesh.metric.curvature import principal_curvatures
-from anisomesh.metric.tensor import curvature_metric, metric_root
-from anisomesh.surface.geometry import unit_frame
-from anisomesh.surface.shapes import cylinder, ellipsoid, sphere, torus
+from anisomesh.metric.tensors import curvature_metric, metric_root
+from anisomesh.shapes.analytic import cylinder, ellipsoid, sphere, torus
 
 AXES = np.array([0.5, 0.4, 0.3])
 

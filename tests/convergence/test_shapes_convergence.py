@@ -6,7 +6,8 @@ import numpy as np
 import pytest
 from scipy.special import ellipeinc, ellipkinc
 
-from anisomesh.surface import cad, shapes
+from anisomesh.shapes import analytic as shapes
+from anisomesh.shapes import cad_part as cad
 
 
 def volume(surface):

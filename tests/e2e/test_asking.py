@@ -7,14 +7,14 @@ import pytest
 from edge_distance import distance_to_edges
 
 import anisomesh
-from anisomesh.clock import Clock
+from anisomesh.deadline import Clock
 from anisomesh.errors import AnisomeshError, OptionError, TimeLimitError
-from anisomesh.evaluation.distance import surface_distance
+from anisomesh.features.detect import points_along
+from anisomesh.mesh import topology
+from anisomesh.mesh.distance import surface_distance
+from anisomesh.mesh.surface import Surface
 from anisomesh.search import smallest_within
-from anisomesh.surface import topology
-from anisomesh.surface.features import points_along
-from anisomesh.surface.mesh import Surface
-from anisomesh.surface.shapes import cad_features, cad_part, cylinder, ellipsoid, open_patch, sphere, torus
+from anisomesh.shapes.analytic import cad_features, cad_part, cylinder, ellipsoid, open_patch, sphere, torus
 
 COUNTS = {
     "sphere": (lambda: sphere(3), (4, 5, 17, 150, 900)),

@@ -9,14 +9,14 @@ import time
 
 import pytest
 
-from anisomesh.batch import methods
-from anisomesh.batch.runs import read_rows, run_suite
-from anisomesh.batch.suite import parse_suite
-from anisomesh.batch.tables import markdown, run_table, web_page
+from anisomesh.bench import methods
+from anisomesh.bench.runs import read_rows, run_suite
+from anisomesh.bench.suite import parse_suite
+from anisomesh.bench.tables import markdown, run_table, web_page
 from anisomesh.errors import AnisomeshError, OptionError
-from anisomesh.surface.io import save
-from anisomesh.surface.mesh import Surface
-from anisomesh.surface.shapes import box, open_patch, sphere
+from anisomesh.io.meshes import save
+from anisomesh.mesh.surface import Surface
+from anisomesh.shapes.analytic import box, open_patch, sphere
 
 OURS = {"name": "ours", "method": "anisomesh", "options": {"max_iterations": 3}}
 TOML = """
@@ -218,8 +218,8 @@ def test_list_and_errors(run_cli, tmp_path):
 
 def test_a_suite_trains_the_networks_that_it_compares(tmp_path, run_cli):
     pytest.importorskip("torch")
-    from anisomesh.dataset.build import build, sources_of
-    from anisomesh.dataset.make import Recipe
+    from anisomesh.learn.data.build import build, sources_of
+    from anisomesh.learn.data.make import Recipe
 
     build(sources_of(None, 6), tmp_path / "items", Recipe(target=200, variants=()), validation=0.4)
     training = {"epochs": 2, "network": {"channels": 8, "scales": 2, "blocks": 1, "heads": 1}}

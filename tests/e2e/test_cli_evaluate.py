@@ -4,8 +4,8 @@ import json
 
 import pytest
 
-from anisomesh.surface.io import save
-from anisomesh.surface.shapes import box, sphere
+from anisomesh.io.meshes import save
+from anisomesh.shapes.analytic import box, sphere
 
 
 @pytest.fixture

@@ -9,7 +9,7 @@ from PIL import Image
 
 from anisomesh import AnisomeshError
 from anisomesh.cli.main import main
-from anisomesh.picture import require_renderer
+from anisomesh.viz import require_renderer
 from conftest import torus_arrays, write_obj
 
 

@@ -9,7 +9,7 @@ import time
 
 import pytest
 
-from anisomesh.surface.io import load
+from anisomesh.io.meshes import load
 from conftest import CLI
 
 

@@ -12,12 +12,12 @@ import pytest
 
 import anisomesh
 from anisomesh.cli.dataset import Variant
-from anisomesh.dataset.build import build, sources_of
-from anisomesh.dataset.make import VARIANTS, Recipe
 from anisomesh.errors import MeshFileError, OptionError
-from anisomesh.learn.items import load_item
-from anisomesh.learn.manifest import MANIFEST, files_of, read_manifest
-from anisomesh.surface.shapes import ellipsoid, sphere, torus
+from anisomesh.learn.data.build import build, sources_of
+from anisomesh.learn.data.items import load_item
+from anisomesh.learn.data.make import VARIANTS, Recipe
+from anisomesh.learn.data.manifest import MANIFEST, files_of, read_manifest
+from anisomesh.shapes.analytic import ellipsoid, sphere, torus
 
 RECIPE = Recipe(target=200, variants=("decimated",))
 
@@ -71,7 +71,8 @@ def test_a_build_keeps_drops_and_lists_and_a_second_one_does_nothing(folder, tmp
 def test_a_build_that_was_killed_goes_on(folder, tmp_path):
     out = tmp_path / "out"
     code = (
-        "from pathlib import Path; from anisomesh.dataset.build import *; from anisomesh.dataset.make import Recipe\n"
+        "from pathlib import Path; from anisomesh.learn.data.build import *\n"
+        "from anisomesh.learn.data.make import Recipe\n"
         f"if __name__ == '__main__': build(sources_of(Path({str(folder)!r}), 0), Path({str(out)!r}), "
         "Recipe(target=200, variants=('decimated',)), workers=1)"
     )
@@ -119,7 +120,7 @@ def test_the_list_has_the_sources_asked_for_and_their_present_families(folder, t
 
 
 def test_the_split_depends_on_the_family_alone(folder):
-    from anisomesh.dataset.build import _start
+    from anisomesh.learn.data.build import _start
 
     splits = {}
     for source in sources_of(folder, 300):

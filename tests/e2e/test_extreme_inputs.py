@@ -7,8 +7,8 @@ import pytest
 
 import anisomesh
 from anisomesh.errors import MeshError, OptionError
-from anisomesh.surface.mesh import Surface
-from anisomesh.surface.shapes import box, sphere
+from anisomesh.mesh.surface import Surface
+from anisomesh.shapes.analytic import box, sphere
 
 BALL = sphere(3)
 TETRAHEDRON = np.array([[0, 2, 1], [0, 1, 3], [1, 2, 3], [2, 0, 3]])

@@ -6,9 +6,9 @@ import pytest
 
 import anisomesh
 from anisomesh.evaluation.preservation import feature_preservation
-from anisomesh.surface.features import corners, points_along, sharp_edges
-from anisomesh.surface.parts import sparse_parts
-from anisomesh.surface.shapes import box
+from anisomesh.features.detect import corners, points_along, sharp_edges
+from anisomesh.shapes.analytic import box
+from anisomesh.shapes.parts import sparse_parts
 
 PARTS = {
     "cube of twelve triangles": (lambda: box(n=1), 200),

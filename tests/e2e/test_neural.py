@@ -8,13 +8,13 @@ torch = pytest.importorskip("torch")
 import anisomesh  # noqa: E402
 from anisomesh.errors import OptionError  # noqa: E402
 from anisomesh.evaluation.report import evaluate  # noqa: E402
-from anisomesh.learn.checkpoint import load_weights  # noqa: E402
-from anisomesh.learn.predict import NOISE_FLOOR, predict  # noqa: E402
-from anisomesh.learn.shipped import shipped_weights, weights_path  # noqa: E402
-from anisomesh.surface.mesh import Surface  # noqa: E402
-from anisomesh.surface.noise import with_noise  # noqa: E402
-from anisomesh.surface.prepare import prepare  # noqa: E402
-from anisomesh.surface.shapes import box, ellipsoid, sphere, torus, twisted_ring  # noqa: E402
+from anisomesh.learn.inference.predict import NOISE_FLOOR, predict  # noqa: E402
+from anisomesh.learn.inference.pretrained import shipped_weights, weights_path  # noqa: E402
+from anisomesh.learn.models.checkpoint import load_weights  # noqa: E402
+from anisomesh.mesh.noise import with_noise  # noqa: E402
+from anisomesh.mesh.surface import Surface  # noqa: E402
+from anisomesh.repair.prepare import prepare  # noqa: E402
+from anisomesh.shapes.analytic import box, ellipsoid, sphere, torus, twisted_ring  # noqa: E402
 
 
 @pytest.fixture(scope="module")

@@ -7,7 +7,7 @@ import pytest
 from PIL import Image
 
 from anisomesh import AnisomeshError, OptionError, Surface
-from anisomesh.picture import Cells, renderer, require_renderer, side_by_side, triangle_stretch
+from anisomesh.viz import Cells, renderer, require_renderer, side_by_side, triangle_stretch
 from conftest import torus_arrays
 
 TITLES = ("same", "same", "cells")

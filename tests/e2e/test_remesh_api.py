@@ -5,11 +5,11 @@ import pytest
 
 import anisomesh
 from anisomesh.errors import MeshError, MetricError, OptionError
-from anisomesh.evaluation.distance import surface_distance
-from anisomesh.evaluation.quality import anisotropic_quality
-from anisomesh.metric.tensor import metric_root
-from anisomesh.surface.mesh import Surface
-from anisomesh.surface.shapes import cad_part, cylinder, open_patch, sphere, torus
+from anisomesh.mesh.distance import surface_distance
+from anisomesh.mesh.surface import Surface
+from anisomesh.metric.quality import anisotropic_quality
+from anisomesh.metric.tensors import metric_root
+from anisomesh.shapes.analytic import cad_part, cylinder, open_patch, sphere, torus
 
 FEW = {"lloyd_iterations": 4, "max_iterations": 15}
 

@@ -18,22 +18,22 @@ torch = pytest.importorskip("torch")
 from tensorboard.backend.event_processing.event_accumulator import EventAccumulator  # noqa: E402
 
 import anisomesh  # noqa: E402
-from anisomesh.dataset.implicit import Blobs  # noqa: E402
-from anisomesh.dataset.make import Recipe, items_of_blobs  # noqa: E402
 from anisomesh.errors import OptionError  # noqa: E402
-from anisomesh.learn.checkpoint import WeightsError, load_state, load_weights, save_state  # noqa: E402
-from anisomesh.learn.config import TrainingOptions, load_training  # noqa: E402
-from anisomesh.learn.items import load_item, save_item  # noqa: E402
-from anisomesh.learn.manifest import Files, files_of  # noqa: E402
-from anisomesh.learn.network import NetworkOptions  # noqa: E402
-from anisomesh.learn.paper import PaperOptions  # noqa: E402
-from anisomesh.learn.predict import predict  # noqa: E402
-from anisomesh.learn.run import CHECKPOINT, EVENTS, METRICS, WEIGHTS, DivergedError  # noqa: E402
-from anisomesh.learn.shipped import weights_path  # noqa: E402
-from anisomesh.learn.tasks import StretchTask  # noqa: E402
-from anisomesh.learn.train import train  # noqa: E402
-from anisomesh.surface.geometry import unit_frame  # noqa: E402
-from anisomesh.surface.working import working_surface  # noqa: E402
+from anisomesh.learn.data.items import load_item, save_item  # noqa: E402
+from anisomesh.learn.data.make import Recipe, items_of_blobs  # noqa: E402
+from anisomesh.learn.data.manifest import Files, files_of  # noqa: E402
+from anisomesh.learn.inference.predict import predict  # noqa: E402
+from anisomesh.learn.inference.pretrained import weights_path  # noqa: E402
+from anisomesh.learn.models.checkpoint import WeightsError, load_state, load_weights, save_state  # noqa: E402
+from anisomesh.learn.models.paper import PaperOptions  # noqa: E402
+from anisomesh.learn.models.stretch import NetworkOptions  # noqa: E402
+from anisomesh.learn.training.config import TrainingOptions, load_training  # noqa: E402
+from anisomesh.learn.training.run import CHECKPOINT, EVENTS, METRICS, WEIGHTS, DivergedError  # noqa: E402
+from anisomesh.learn.training.tasks import StretchTask  # noqa: E402
+from anisomesh.learn.training.train import train  # noqa: E402
+from anisomesh.mesh.geometry import unit_frame  # noqa: E402
+from anisomesh.mesh.working_surface import working_surface  # noqa: E402
+from anisomesh.shapes.implicit import Blobs  # noqa: E402
 
 PAPER = PaperOptions(channels=8, levels=2)
 NETWORK = NetworkOptions(channels=16, scales=3, blocks=1, heads=2)

@@ -8,13 +8,13 @@ from tests.reference import naive_rvd as naive
 from anisomesh.cvt.boundary import Boundary
 from anisomesh.cvt.features import Features
 from anisomesh.cvt.optimise import lloyd, minimise
-from anisomesh.cvt.voronoi import RestrictedVoronoi
+from anisomesh.features.boundary import boundary_curves
+from anisomesh.features.detect import sharp_edges
+from anisomesh.mesh import topology
+from anisomesh.mesh.surface import Surface
 from anisomesh.pipeline import remesh
-from anisomesh.surface import topology
-from anisomesh.surface.boundary import boundary_curves
-from anisomesh.surface.features import sharp_edges
-from anisomesh.surface.mesh import Surface
-from anisomesh.surface.shapes import open_patch, sphere
+from anisomesh.shapes.analytic import open_patch, sphere
+from anisomesh.voronoi.restricted import RestrictedVoronoi
 
 
 def band(around=60, across=8, height=1.0):

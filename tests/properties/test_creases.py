@@ -7,16 +7,16 @@ from tests.reference import naive_rvd as naive
 from anisomesh.cvt.creases import Creases, resolved
 from anisomesh.cvt.features import Features
 from anisomesh.cvt.optimise import lloyd
-from anisomesh.cvt.voronoi import RestrictedVoronoi
-from anisomesh.dual.creases import join_along_creases
-from anisomesh.dual.decimate import decimate
-from anisomesh.dual.flip import flip_for_shape
-from anisomesh.surface import topology
-from anisomesh.surface.closest import ClosestPoints
-from anisomesh.surface.creases import crease_curves
-from anisomesh.surface.features import corners, sharp_edges
-from anisomesh.surface.mesh import Surface
-from anisomesh.surface.shapes import box, cad_part, cylinder, open_patch, sphere
+from anisomesh.delaunay.creases import join_along_creases
+from anisomesh.features.creases import crease_curves
+from anisomesh.features.detect import corners, sharp_edges
+from anisomesh.mesh import topology
+from anisomesh.mesh.closest_points import ClosestPoints
+from anisomesh.mesh.surface import Surface
+from anisomesh.meshops.collapse import decimate
+from anisomesh.meshops.flip import flip_for_shape
+from anisomesh.shapes.analytic import box, cad_part, cylinder, open_patch, sphere
+from anisomesh.voronoi.restricted import RestrictedVoronoi
 
 # shape, number of curves, of closed ones, of corners
 SHAPES = {

@@ -6,13 +6,13 @@ from dual_cases import assert_closed_manifold
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from anisomesh.dual.flip import do_flips, flip_for_shape, possible_flips
-from anisomesh.evaluation.quality import anisotropic_quality
-from anisomesh.surface import topology
-from anisomesh.surface.closest import ClosestPoints
-from anisomesh.surface.features import sharp_edges
-from anisomesh.surface.mesh import Surface
-from anisomesh.surface.shapes import box, cad_part, open_patch, sphere, torus
+from anisomesh.features.detect import sharp_edges
+from anisomesh.mesh import topology
+from anisomesh.mesh.closest_points import ClosestPoints
+from anisomesh.mesh.surface import Surface
+from anisomesh.meshops.flip import do_flips, flip_for_shape, possible_flips
+from anisomesh.metric.quality import anisotropic_quality
+from anisomesh.shapes.analytic import box, cad_part, open_patch, sphere, torus
 
 SHAPES = {"sphere": sphere(2), "torus": torus(1.0, 0.3, 24, 10), "part": cad_part(5)}
 

@@ -4,13 +4,13 @@ import numpy as np
 import pytest
 from dual_cases import assert_closed_manifold, mended
 
-from anisomesh.cvt.voronoi import RestrictedVoronoi
-from anisomesh.dual.cells import cells_of
-from anisomesh.dual.loops import points_on_loops
-from anisomesh.surface import shapes
-from anisomesh.surface.closest import ClosestPoints
-from anisomesh.surface.mesh import Surface
-from anisomesh.surface.patches import grid_faces
+from anisomesh.delaunay.noncontractible_loops import points_on_loops
+from anisomesh.mesh.closest_points import ClosestPoints
+from anisomesh.mesh.surface import Surface
+from anisomesh.shapes import analytic as shapes
+from anisomesh.shapes.patches import grid_faces
+from anisomesh.voronoi.cells import cells_of
+from anisomesh.voronoi.restricted import RestrictedVoronoi
 
 
 def spindle(height):

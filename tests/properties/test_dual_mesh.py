@@ -9,11 +9,12 @@ from dual_cases import assert_closed_manifold, dual_case
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from anisomesh.cvt.voronoi import RestrictedVoronoi
-from anisomesh.dual.cells import cells_of
-from anisomesh.dual.simplicial import simplicial_mesh
-from anisomesh.surface import shapes, topology
-from anisomesh.surface.mesh import Surface
+from anisomesh.delaunay.delta_complex import simplicial_mesh
+from anisomesh.mesh import topology
+from anisomesh.mesh.surface import Surface
+from anisomesh.shapes import analytic as shapes
+from anisomesh.voronoi.cells import cells_of
+from anisomesh.voronoi.restricted import RestrictedVoronoi
 
 CLOSED = {
     "sphere": (lambda: shapes.sphere(3), 2, 150),

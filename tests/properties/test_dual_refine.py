@@ -6,13 +6,14 @@ import pytest
 from dual_cases import assert_closed_manifold, mended
 
 from anisomesh.cvt.optimise import lloyd
-from anisomesh.cvt.voronoi import RestrictedVoronoi
-from anisomesh.dual import refine
-from anisomesh.dual.cells import cells_of
-from anisomesh.evaluation.distance import surface_distance
-from anisomesh.evaluation.validity import check_validity
-from anisomesh.surface import shapes, topology
-from anisomesh.surface.mesh import Surface
+from anisomesh.delaunay import refine
+from anisomesh.mesh import topology
+from anisomesh.mesh.distance import surface_distance
+from anisomesh.mesh.surface import Surface
+from anisomesh.mesh.validity import check_validity
+from anisomesh.shapes import analytic as shapes
+from anisomesh.voronoi.cells import cells_of
+from anisomesh.voronoi.restricted import RestrictedVoronoi
 
 CASES = {
     "torus": (lambda: shapes.torus(n_major=32, n_minor=14), 8),

@@ -4,22 +4,22 @@ import numpy as np
 import pytest
 from creases import wedge
 
-from anisomesh.cvt.voronoi import RestrictedVoronoi
-from anisomesh.dual.cells import cells_of
-from anisomesh.dual.decimate import collapsible_edges, decimate
-from anisomesh.dual.exchange import exchange_sites
-from anisomesh.dual.grow import grow
-from anisomesh.dual.place import cells_with_crease, crease_positions, on_main_planes, snap_to_missed
-from anisomesh.dual.simplicial import simplicial_mesh
-from anisomesh.dual.triangulate import dual_mesh
-from anisomesh.dual.untangle import untangle
-from anisomesh.evaluation.validity import check_validity, flipped_faces
-from anisomesh.surface import topology
-from anisomesh.surface.closest import ClosestPoints
-from anisomesh.surface.features import corners, sharp_edges
-from anisomesh.surface.geometry import thickness
-from anisomesh.surface.mesh import Surface
-from anisomesh.surface.shapes import box, cad_part, open_patch, sphere, torus
+from anisomesh.cvt.relocation import exchange_sites
+from anisomesh.delaunay.delta_complex import simplicial_mesh
+from anisomesh.delaunay.dual import dual_mesh
+from anisomesh.delaunay.placement import cells_with_crease, crease_positions, on_main_planes, snap_to_missed
+from anisomesh.features.detect import corners, sharp_edges
+from anisomesh.mesh import topology
+from anisomesh.mesh.closest_points import ClosestPoints
+from anisomesh.mesh.geometry import thickness
+from anisomesh.mesh.surface import Surface
+from anisomesh.mesh.validity import check_validity, flipped_faces
+from anisomesh.meshops.collapse import collapsible_edges, decimate
+from anisomesh.meshops.split import grow
+from anisomesh.meshops.untangle import untangle
+from anisomesh.shapes.analytic import box, cad_part, open_patch, sphere, torus
+from anisomesh.voronoi.cells import cells_of
+from anisomesh.voronoi.restricted import RestrictedVoronoi
 
 SHAPES = {"sphere": sphere(3), "torus": torus(1.0, 0.3, 48, 16), "part": cad_part(8)}
 

@@ -4,13 +4,13 @@ import numpy as np
 import pytest
 from tests.reference.dual_cases import assert_closed_manifold
 
-from anisomesh.dual.separate import separate
-from anisomesh.evaluation.validity import check_validity, crossing_facets, new_intersections
+from anisomesh.mesh.closest_points import ClosestPoints
+from anisomesh.mesh.intersections import self_intersections
+from anisomesh.mesh.surface import Surface
+from anisomesh.mesh.validity import check_validity, crossing_facets, new_intersections
+from anisomesh.meshops.self_intersections import separate
 from anisomesh.pipeline import remesh
-from anisomesh.surface.closest import ClosestPoints
-from anisomesh.surface.intersections import self_intersections
-from anisomesh.surface.mesh import Surface
-from anisomesh.surface.shapes import box, sphere
+from anisomesh.shapes.analytic import box, sphere
 
 
 def both(a, b):

@@ -9,9 +9,9 @@ from scipy.spatial.transform import Rotation
 from anisomesh.embedding.base import EmbeddingStatus, achieved_stretch
 from anisomesh.embedding.direct import embed
 from anisomesh.embedding.gradient import face_gradient
-from anisomesh.metric.tensor import compute_metric, metric_root
-from anisomesh.surface.geometry import unit_frame
-from anisomesh.surface.shapes import box, ellipsoid, open_patch, torus, twisted_ring
+from anisomesh.mesh.geometry import unit_frame
+from anisomesh.metric.tensors import compute_metric, metric_root
+from anisomesh.shapes.analytic import box, ellipsoid, open_patch, torus, twisted_ring
 
 
 def scaled(surface):

@@ -4,8 +4,8 @@ import naive_rvd as naive
 import numpy as np
 import pytest
 
-from anisomesh.cvt.voronoi import RestrictedVoronoi, facet_table
-from anisomesh.surface import shapes
+from anisomesh.shapes import analytic as shapes
+from anisomesh.voronoi.restricted import RestrictedVoronoi, facet_table
 
 SHAPES = {
     "sphere": lambda: shapes.sphere(1),

@@ -9,8 +9,8 @@ import numpy as np
 import pytest
 
 from anisomesh.errors import MeshFileError
-from anisomesh.surface.io import FORMATS, load, save
-from anisomesh.surface.mesh import Surface
+from anisomesh.io.meshes import FORMATS, load, save
+from anisomesh.mesh.surface import Surface
 
 CASES = 2_300  # of each kind of file
 MOST_BYTES = 8 * 2**20  # more than any of these files has a right to

@@ -9,9 +9,9 @@ from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
 from anisomesh.errors import MeshFileError
-from anisomesh.surface import shapes
-from anisomesh.surface.io import FORMATS, load, save
-from anisomesh.surface.mesh import Surface
+from anisomesh.io.meshes import FORMATS, load, save
+from anisomesh.mesh.surface import Surface
+from anisomesh.shapes import analytic as shapes
 
 EXACT = [".obj", ".off", ".ply", ".vtu", ".msh", ".mesh"]
 any_float = st.floats(allow_nan=False, allow_infinity=False)

@@ -6,8 +6,8 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from scipy.spatial.transform import Rotation
 
-from anisomesh.metric.tensor import compute_metric
-from anisomesh.surface.shapes import ellipsoid
+from anisomesh.metric.tensors import compute_metric
+from anisomesh.shapes.analytic import ellipsoid
 
 SURFACE = ellipsoid((0.45, 0.3, 0.15), 3)
 

@@ -11,10 +11,11 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from anisomesh.errors import MeshError, OptionError
-from anisomesh.surface import shapes, topology
-from anisomesh.surface.io import load
-from anisomesh.surface.mesh import Surface
-from anisomesh.surface.prepare import Prepared, prepare
+from anisomesh.io.meshes import load
+from anisomesh.mesh import topology
+from anisomesh.mesh.surface import Surface
+from anisomesh.repair.prepare import Prepared, prepare
+from anisomesh.shapes import analytic as shapes
 
 TETRAHEDRON = np.array([[0, 2, 1], [0, 1, 3], [1, 2, 3], [2, 0, 3]])
 

@@ -6,9 +6,9 @@ import pytest
 from hypothesis import strategies as st
 from random_shapes import SHAPES
 
+from anisomesh.mesh import topology
 from anisomesh.pipeline import remesh
-from anisomesh.surface import topology
-from anisomesh.surface.prepare import prepare
+from anisomesh.repair.prepare import prepare
 
 
 @pytest.mark.parametrize("make", SHAPES)

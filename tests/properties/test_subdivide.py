@@ -6,9 +6,10 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from anisomesh.errors import OptionError
-from anisomesh.surface import shapes, topology
-from anisomesh.surface.mesh import Surface
-from anisomesh.surface.subdivide import split_long_edges
+from anisomesh.mesh import topology
+from anisomesh.mesh.subdivision import split_long_edges
+from anisomesh.mesh.surface import Surface
+from anisomesh.shapes import analytic as shapes
 
 CLOSED = {
     "part": shapes.cad_part(4),

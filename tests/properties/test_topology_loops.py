@@ -8,8 +8,9 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from anisomesh.surface import shapes, topology
-from anisomesh.surface.mesh import Surface
+from anisomesh.mesh import topology
+from anisomesh.mesh.surface import Surface
+from anisomesh.shapes import analytic as shapes
 
 
 @st.composite

@@ -6,10 +6,10 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from anisomesh.cvt.voronoi import RestrictedVoronoi
-from anisomesh.dual.cells import cells_of
-from anisomesh.surface import shapes
-from anisomesh.surface.mesh import Surface
+from anisomesh.mesh.surface import Surface
+from anisomesh.shapes import analytic as shapes
+from anisomesh.voronoi.cells import cells_of
+from anisomesh.voronoi.restricted import RestrictedVoronoi
 
 
 def special_points(surface):

@@ -7,9 +7,10 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from anisomesh._kernels import integrate
-from anisomesh.cvt.voronoi import RestrictedVoronoi
 from anisomesh.errors import OptionError
-from anisomesh.surface import shapes, topology
+from anisomesh.mesh import topology
+from anisomesh.shapes import analytic as shapes
+from anisomesh.voronoi.restricted import RestrictedVoronoi
 
 SHAPES = {
     "sphere": lambda: shapes.sphere(1),

@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from anisomesh.surface.mesh import Surface
+from anisomesh.mesh.surface import Surface
 
 
 def wedge(angle):

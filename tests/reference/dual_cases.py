@@ -4,14 +4,14 @@ import numpy as np
 
 from anisomesh.cvt.features import Features
 from anisomesh.cvt.optimise import lloyd
-from anisomesh.cvt.voronoi import RestrictedVoronoi
-from anisomesh.dual.cells import cells_of
-from anisomesh.dual.refine import refine
-from anisomesh.dual.triangulate import dual_mesh
-from anisomesh.metric.tensor import uniform_metric
-from anisomesh.surface import topology
-from anisomesh.surface.features import sharp_edges
-from anisomesh.surface.mesh import Surface
+from anisomesh.delaunay.dual import dual_mesh
+from anisomesh.delaunay.refine import refine
+from anisomesh.features.detect import sharp_edges
+from anisomesh.mesh import topology
+from anisomesh.mesh.surface import Surface
+from anisomesh.metric.tensors import uniform_metric
+from anisomesh.voronoi.cells import cells_of
+from anisomesh.voronoi.restricted import RestrictedVoronoi
 
 
 def dual_case(surface, sites, points=None, iterations=0):

@@ -2,8 +2,8 @@
 
 import numpy as np
 
-from anisomesh.surface.mesh import Surface
-from anisomesh.surface.shapes import box, cylinder, open_patch, sphere
+from anisomesh.mesh.surface import Surface
+from anisomesh.shapes.analytic import box, cylinder, open_patch, sphere
 
 
 def sheet(rng):

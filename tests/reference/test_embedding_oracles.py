@@ -10,8 +10,8 @@ from anisomesh._kernels.local_step import local_step
 from anisomesh.embedding.gradient import eigen_2x2, face_gradient, face_tensors
 from anisomesh.embedding.ordering import nested_dissection
 from anisomesh.embedding.poisson import factorise, poisson_solver
-from anisomesh.surface.mesh import Surface
-from anisomesh.surface.shapes import ellipsoid, open_patch, sphere, torus
+from anisomesh.mesh.surface import Surface
+from anisomesh.shapes.analytic import ellipsoid, open_patch, sphere, torus
 
 
 def two_shapes():

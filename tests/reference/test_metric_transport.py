@@ -4,7 +4,7 @@ import numpy as np
 from scipy.spatial.transform import Rotation
 
 from anisomesh.metric.tangent import line_directions, line_field, one_ring_average, tangent_frames, unit_normals
-from anisomesh.surface.shapes import ellipsoid
+from anisomesh.shapes.analytic import ellipsoid
 
 SURFACE = ellipsoid((1.0, 0.5, 0.3), 1)
 

@@ -2,10 +2,10 @@
 
 import pytest
 
-from anisomesh.batch.inputs import inputs_of, make_shape
-from anisomesh.batch.suite import load_suite, parse_suite, shipped_suites
+from anisomesh.bench.inputs import inputs_of, make_shape
+from anisomesh.bench.suite import load_suite, parse_suite, shipped_suites
 from anisomesh.errors import OptionError
-from anisomesh.learn.shipped import shipped_weights
+from anisomesh.learn.inference.pretrained import shipped_weights
 from anisomesh.options import RemeshOptions
 
 LEARNING = ("ablation-loss", "ablation-laplacian")
@@ -44,7 +44,7 @@ def test_networks_that_shipped_suites_name_come_with_the_package():
 @pytest.mark.parametrize("name", LEARNING)
 def test_networks_of_shipped_suites_can_be_trained(name):
     pytest.importorskip("torch")
-    from anisomesh.learn.config import parse_training
+    from anisomesh.learn.training.config import parse_training
 
     for method in load_suite(name).methods:
         assert method.options["embedding"] == "neural"

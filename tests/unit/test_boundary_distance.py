@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from anisomesh.evaluation.boundary import boundary_distance
-from anisomesh.surface.shapes import open_patch, sphere
+from anisomesh.shapes.analytic import open_patch, sphere
 
 
 def flat(n, half_width=1.0):

@@ -4,9 +4,9 @@ import numpy as np
 import pytest
 from creases import wedge
 
-from anisomesh.surface.closest import ClosestPoints, squared_distances_to
-from anisomesh.surface.mesh import Surface
-from anisomesh.surface.shapes import box
+from anisomesh.mesh.closest_points import ClosestPoints, squared_distances_to
+from anisomesh.mesh.surface import Surface
+from anisomesh.shapes.analytic import box
 
 
 def test_pseudo_normal_on_an_edge_is_the_sum_of_both_sides():

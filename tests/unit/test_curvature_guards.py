@@ -7,9 +7,9 @@ import numpy as np
 import pytest
 
 from anisomesh.errors import OptionError
+from anisomesh.mesh.surface import Surface
 from anisomesh.metric.curvature import principal_curvatures
-from anisomesh.surface.mesh import Surface
-from anisomesh.surface.shapes import box, open_patch, sphere, torus
+from anisomesh.shapes.analytic import box, open_patch, sphere, torus
 
 TETRAHEDRON = (
     np.array([[0.0, 0, 0], [1, 0, 0], [0, 1, 0], [0, 0, 1]]),
@@ -181,9 +181,9 @@ import sys
 import numpy as np
 from pathlib import Path
 from anisomesh.metric.curvature import principal_curvatures
-from anisomesh.surface.geometry import unit_frame
+from anisomesh.mesh.geometry import unit_frame
 import trimesh
-from anisomesh.surface.mesh import Surface
+from anisomesh.mesh.surface import Surface
 done = 0
 for path in sorted(Path(sys.argv[1]).glob("*.ply")):
     if path.stat().st_size > 150_000 and not path.name.startswith("dress"):

@@ -6,10 +6,10 @@ import numpy as np
 import pytest
 
 from anisomesh.errors import OptionError
-from anisomesh.evaluation.distance import squared_distances, surface_distance
-from anisomesh.evaluation.sampling import points_on_faces
-from anisomesh.surface.mesh import Surface
-from anisomesh.surface.shapes import ellipsoid, open_patch, sphere, torus
+from anisomesh.mesh.distance import squared_distances, surface_distance
+from anisomesh.mesh.sampling import points_on_faces
+from anisomesh.mesh.surface import Surface
+from anisomesh.shapes.analytic import ellipsoid, open_patch, sphere, torus
 
 
 def plane(n=6):

@@ -7,9 +7,9 @@ from anisomesh.embedding.base import EmbeddingStatus, achieved_stretch, asked_st
 from anisomesh.embedding.direct import embed
 from anisomesh.embedding.gradient import face_frames, face_gradient, face_tensors
 from anisomesh.errors import OptionError
-from anisomesh.metric.tensor import compute_metric, uniform_metric
-from anisomesh.surface.mesh import Surface
-from anisomesh.surface.shapes import box, cylinder, open_patch, sphere, torus
+from anisomesh.mesh.surface import Surface
+from anisomesh.metric.tensors import compute_metric, uniform_metric
+from anisomesh.shapes.analytic import box, cylinder, open_patch, sphere, torus
 
 
 def circular_metric(surface, stretch):

@@ -5,10 +5,10 @@ import pytest
 
 from anisomesh.embedding.base import EmbeddingStatus
 from anisomesh.embedding.direct import embed
-from anisomesh.embedding.given import given_embedding, pulled_back_metric
-from anisomesh.metric.tensor import compute_metric
-from anisomesh.surface.mesh import Surface
-from anisomesh.surface.shapes import ellipsoid, open_patch
+from anisomesh.embedding.precomputed import given_embedding, pulled_back_metric
+from anisomesh.mesh.surface import Surface
+from anisomesh.metric.tensors import compute_metric
+from anisomesh.shapes.analytic import ellipsoid, open_patch
 
 
 def test_linear_coordinates_on_a_plane_have_the_metric_of_their_slopes():

@@ -8,8 +8,8 @@ import pytest
 import anisomesh
 from anisomesh.errors import MeshError
 from anisomesh.evaluation.report import evaluate
-from anisomesh.surface.mesh import Surface
-from anisomesh.surface.shapes import box, cad_part, open_patch, sphere, torus
+from anisomesh.mesh.surface import Surface
+from anisomesh.shapes.analytic import box, cad_part, open_patch, sphere, torus
 
 
 def numbers(value):

@@ -3,10 +3,10 @@
 import numpy as np
 import pytest
 
-from anisomesh.dataset.implicit import Blobs
 from anisomesh.errors import MeshError
+from anisomesh.mesh import topology
 from anisomesh.metric.curvature import principal_curvatures
-from anisomesh.surface import topology
+from anisomesh.shapes.implicit import Blobs
 
 
 @pytest.mark.parametrize("seed", range(4))

@@ -11,11 +11,11 @@ import numpy as np
 import pytest
 
 from anisomesh.errors import MeshFileError
-from anisomesh.surface import shapes
-from anisomesh.surface.files import atomic_path
-from anisomesh.surface.gmsh_counts import check_counts
-from anisomesh.surface.io import FORMATS, load, save
-from anisomesh.surface.mesh import Surface
+from anisomesh.io.atomic import atomic_path
+from anisomesh.io.gmsh_counts import check_counts
+from anisomesh.io.meshes import FORMATS, load, save
+from anisomesh.mesh.surface import Surface
+from anisomesh.shapes import analytic as shapes
 
 BOX = shapes.box(n=2)
 PLY = "ply\nformat ascii 1.0\nelement vertex 3\nproperty float x\nproperty float y\nproperty float z\n"
@@ -290,7 +290,7 @@ def test_common_formats_need_no_heavy_library(tmp_path):
     for suffix in (".obj", ".off", ".ply", ".stl", ".mesh"):
         save(BOX, tmp_path / f"a{suffix}")
     code = (
-        "import sys; from anisomesh.surface.io import load; "
+        "import sys; from anisomesh.io.meshes import load; "
         f"[load({str(tmp_path)!r} + '/a' + s) for s in ('.obj', '.off', '.ply', '.stl', '.mesh')]; "
         "print(sorted({'trimesh', 'meshio', 'igl', 'numba', 'torch', 'pyvista'} & set(sys.modules)))"
     )

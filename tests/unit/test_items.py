@@ -4,15 +4,15 @@ import numpy as np
 import pytest
 import trimesh
 
-from anisomesh.dataset.implicit import Blobs
-from anisomesh.dataset.make import Recipe, UnsuitableError, evened, items_of_blobs, items_of_mesh
 from anisomesh.errors import MeshFileError, OptionError
-from anisomesh.evaluation.distance import surface_distance
-from anisomesh.learn.items import Item, load_item, save_item
+from anisomesh.learn.data.items import Item, load_item, save_item
+from anisomesh.learn.data.make import Recipe, UnsuitableError, evened, items_of_blobs, items_of_mesh
+from anisomesh.mesh.distance import surface_distance
+from anisomesh.mesh.geometry import thickness
 from anisomesh.metric.curvature import principal_curvatures
-from anisomesh.metric.tensor import curvature_metric, validate_metric
-from anisomesh.surface.geometry import thickness
-from anisomesh.surface.shapes import box, ellipsoid, sphere, torus
+from anisomesh.metric.tensors import curvature_metric, validate_metric
+from anisomesh.shapes.analytic import box, ellipsoid, sphere, torus
+from anisomesh.shapes.implicit import Blobs
 
 RECIPE = Recipe(target=500)
 

@@ -7,8 +7,8 @@ import pytest
 
 torch = pytest.importorskip("torch")
 
-from anisomesh.learn.graph import graph_of, hierarchy  # noqa: E402
-from anisomesh.learn.messages import (  # noqa: E402
+from anisomesh.learn.models.graph import graph_of, hierarchy  # noqa: E402
+from anisomesh.learn.models.messages import (  # noqa: E402
     distance_by_gather,
     distance_of_neighbours,
     largest_by_scatter,
@@ -16,8 +16,8 @@ from anisomesh.learn.messages import (  # noqa: E402
     mean_by_scatter,
     mean_of_neighbours,
 )
-from anisomesh.surface.mesh import Surface  # noqa: E402
-from anisomesh.surface.shapes import open_patch, sphere, torus  # noqa: E402
+from anisomesh.mesh.surface import Surface  # noqa: E402
+from anisomesh.shapes.analytic import open_patch, sphere, torus  # noqa: E402
 
 
 def random_graph(n=40, n_edges=120, values=3, seed=0):

@@ -5,22 +5,22 @@ import pytest
 
 torch = pytest.importorskip("torch")
 
-from anisomesh.learn.config import TrainingOptions  # noqa: E402
-from anisomesh.learn.examples import example_of  # noqa: E402
-from anisomesh.learn.graph import graph_of  # noqa: E402
-from anisomesh.learn.items import Item  # noqa: E402
-from anisomesh.learn.lines import MOST, directions_of, lines_in, tensors_of  # noqa: E402
-from anisomesh.learn.losses import line_loss, offset_loss  # noqa: E402
-from anisomesh.learn.messages import mean_by_scatter  # noqa: E402
-from anisomesh.learn.network import Block, NetworkOptions, StretchNetwork  # noqa: E402
-from anisomesh.learn.pyramid import N_EDGE, N_NODE, pyramid  # noqa: E402
-from anisomesh.learn.tasks import StretchTask  # noqa: E402
+from anisomesh.learn.data.examples import example_of  # noqa: E402
+from anisomesh.learn.data.items import Item  # noqa: E402
+from anisomesh.learn.models.graph import graph_of  # noqa: E402
+from anisomesh.learn.models.hierarchy import N_EDGE, N_NODE, pyramid  # noqa: E402
+from anisomesh.learn.models.messages import mean_by_scatter  # noqa: E402
+from anisomesh.learn.models.stretch import Block, NetworkOptions, StretchNetwork  # noqa: E402
+from anisomesh.learn.training.config import TrainingOptions  # noqa: E402
+from anisomesh.learn.training.losses import line_loss, offset_loss  # noqa: E402
+from anisomesh.learn.training.tasks import StretchTask  # noqa: E402
+from anisomesh.mesh.noise import NOISES, with_noise  # noqa: E402
+from anisomesh.mesh.surface import Surface  # noqa: E402
 from anisomesh.metric.curvature import principal_curvatures  # noqa: E402
+from anisomesh.metric.line_field import MOST, directions_of, lines_in, tensors_of  # noqa: E402
 from anisomesh.metric.tangent import tangent_frames  # noqa: E402
-from anisomesh.metric.tensor import curvature_metric  # noqa: E402
-from anisomesh.surface.mesh import Surface  # noqa: E402
-from anisomesh.surface.noise import NOISES, with_noise  # noqa: E402
-from anisomesh.surface.shapes import ellipsoid, open_patch, sphere, torus  # noqa: E402
+from anisomesh.metric.tensors import curvature_metric  # noqa: E402
+from anisomesh.shapes.analytic import ellipsoid, open_patch, sphere, torus  # noqa: E402
 
 SMALL = NetworkOptions(channels=16, scales=3, blocks=1, heads=2)
 
@@ -175,7 +175,7 @@ def test_it_does_not_matter_how_many_edges_are_worked_on_at_once(monkeypatch):
     torch.manual_seed(0)
     surface, network = shaken(torus(n_major=24, n_minor=12)), StretchNetwork(SMALL).eval()
     whole, offsets = predicted(network, surface)
-    monkeypatch.setattr("anisomesh.learn.network._AT_ONCE", 7)
+    monkeypatch.setattr("anisomesh.learn.models.stretch._AT_ONCE", 7)
     parts, other_offsets = predicted(network, surface)
     np.testing.assert_allclose(parts, whole, rtol=1e-5, atol=1e-5)  # entries are about 1, of single precision
     np.testing.assert_allclose(other_offsets, offsets, atol=1e-4 * np.abs(offsets).max())

@@ -5,10 +5,8 @@ import pytest
 
 torch = pytest.importorskip("torch")
 
-from anisomesh.learn.config import TrainingOptions  # noqa: E402
-from anisomesh.learn.items import Item  # noqa: E402
-from anisomesh.learn.losses import corner_dots, cosine_loss, dot_loss, l2_loss, laplacian_loss  # noqa: E402
-from anisomesh.learn.paper import (  # noqa: E402
+from anisomesh.learn.data.items import Item  # noqa: E402
+from anisomesh.learn.models.paper import (  # noqa: E402
     PaperConvolution,
     PaperNetwork,
     PaperOptions,
@@ -16,9 +14,11 @@ from anisomesh.learn.paper import (  # noqa: E402
     interpolated,
     seen_of,
 )
-from anisomesh.learn.tasks import EmbeddingTask, random_symmetry  # noqa: E402
-from anisomesh.surface.mesh import Surface  # noqa: E402
-from anisomesh.surface.shapes import sphere, torus  # noqa: E402
+from anisomesh.learn.training.config import TrainingOptions  # noqa: E402
+from anisomesh.learn.training.losses import corner_dots, cosine_loss, dot_loss, l2_loss, laplacian_loss  # noqa: E402
+from anisomesh.learn.training.tasks import EmbeddingTask, random_symmetry  # noqa: E402
+from anisomesh.mesh.surface import Surface  # noqa: E402
+from anisomesh.shapes.analytic import sphere, torus  # noqa: E402
 
 
 def shaken(surface):
@@ -136,8 +136,8 @@ def test_dot_loss_does_not_depend_on_the_size_of_the_mesh():
 
 
 def test_the_laplacian_of_linear_values_on_a_regular_grid_is_zero_within():
-    from anisomesh.learn.losses import _laplacian
-    from anisomesh.surface.shapes import open_patch
+    from anisomesh.learn.training.losses import _laplacian
+    from anisomesh.shapes.analytic import open_patch
 
     patch = open_patch(lambda x, y: 0.0 * x, n=6)
     values = torch.from_numpy(patch.points @ np.random.default_rng(0).normal(size=(3, 2)))

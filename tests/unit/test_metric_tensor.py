@@ -4,9 +4,10 @@ import numpy as np
 import pytest
 
 from anisomesh.errors import MetricError, OptionError
+from anisomesh.mesh.surface import Surface
 from anisomesh.metric.curvature import Curvature, principal_curvatures
 from anisomesh.metric.tangent import tangent_frames
-from anisomesh.metric.tensor import (
+from anisomesh.metric.tensors import (
     approximation_metric,
     compute_metric,
     curvature_metric,
@@ -14,8 +15,7 @@ from anisomesh.metric.tensor import (
     uniform_metric,
     validate_metric,
 )
-from anisomesh.surface.mesh import Surface
-from anisomesh.surface.shapes import cylinder, ellipsoid, open_patch, sphere
+from anisomesh.shapes.analytic import cylinder, ellipsoid, open_patch, sphere
 
 
 def made_up_curvature(surface, low, high, seed=0):

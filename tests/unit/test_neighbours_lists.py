@@ -5,8 +5,8 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from anisomesh.cvt.neighbours import NeighbourLists
-from anisomesh.cvt.workers import Workers
+from anisomesh.voronoi.neighbour_lists import NeighbourLists
+from anisomesh.voronoi.threads import Workers
 
 
 def assert_lists_hold(table, sites):

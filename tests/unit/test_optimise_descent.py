@@ -9,8 +9,8 @@ import pytest
 from anisomesh.cvt import optimise
 from anisomesh.cvt.optimise import Status, lloyd, minimise
 from anisomesh.cvt.sampling import sample_surface
-from anisomesh.cvt.voronoi import Evaluation, RestrictedVoronoi
-from anisomesh.surface import shapes
+from anisomesh.shapes import analytic as shapes
+from anisomesh.voronoi.restricted import Evaluation, RestrictedVoronoi
 
 
 def start(n=40, seed=0, surface=None):

@@ -3,12 +3,12 @@
 import numpy as np
 import pytest
 
-from anisomesh.dataset.lofts import random_part
 from anisomesh.errors import OptionError
-from anisomesh.surface import topology
-from anisomesh.surface.features import corners, sharp_edges
-from anisomesh.surface.intersections import self_intersections
-from anisomesh.surface.parts import hollow_loft, loft, prism, revolution, sparse_parts
+from anisomesh.features.detect import corners, sharp_edges
+from anisomesh.mesh import topology
+from anisomesh.mesh.intersections import self_intersections
+from anisomesh.shapes.lofts import random_part
+from anisomesh.shapes.parts import hollow_loft, loft, prism, revolution, sparse_parts
 
 CORNERS = {"cube": 8, "slab": 8, "rod": 8, "bracket": 12, "channel": 16, "stairs": 20, "hexagon": 12, "gear": 24}
 

@@ -6,7 +6,7 @@ from hypothesis import assume, given
 from hypothesis import strategies as st
 
 from anisomesh.errors import OptionError
-from anisomesh.picture.camera import camera_axes, framed, height_for
+from anisomesh.viz.camera import camera_axes, framed, height_for
 
 numbers = st.floats(-10.0, 10.0)
 

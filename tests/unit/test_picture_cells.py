@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 
 import anisomesh
-from anisomesh.picture.cells import Cells, voronoi_cells
-from anisomesh.surface.mesh import Surface
+from anisomesh.mesh.surface import Surface
+from anisomesh.viz.cells import Cells, voronoi_cells
 from conftest import torus_arrays
 
 

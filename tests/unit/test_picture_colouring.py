@@ -3,11 +3,11 @@
 import numpy as np
 import pytest
 
-from anisomesh.evaluation.quality import anisotropic_quality
-from anisomesh.metric.tensor import compute_metric, metric_root
-from anisomesh.picture.colouring import Colouring, distance_colouring, quality_colouring, stretch_colouring
-from anisomesh.surface.geometry import unit_frame
-from anisomesh.surface.shapes import ellipsoid, sphere
+from anisomesh.mesh.geometry import unit_frame
+from anisomesh.metric.quality import anisotropic_quality
+from anisomesh.metric.tensors import compute_metric, metric_root
+from anisomesh.shapes.analytic import ellipsoid, sphere
+from anisomesh.viz.colouring import Colouring, distance_colouring, quality_colouring, stretch_colouring
 
 
 def moved(surface):

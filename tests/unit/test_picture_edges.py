@@ -5,10 +5,10 @@ from itertools import pairwise
 import numpy as np
 import pytest
 
-from anisomesh.picture.camera import View, camera_axes, framed
-from anisomesh.picture.edges import edge_style, in_view
-from anisomesh.surface.mesh import Surface
-from anisomesh.surface.shapes import box, sphere
+from anisomesh.mesh.surface import Surface
+from anisomesh.shapes.analytic import box, sphere
+from anisomesh.viz.camera import View, camera_axes, framed
+from anisomesh.viz.edges import edge_style, in_view
 from conftest import torus_arrays
 
 SIZE = (400, 300)

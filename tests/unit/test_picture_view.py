@@ -5,8 +5,8 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from anisomesh.picture.view import closeup, triangle_stretch, whole_view
-from anisomesh.surface.mesh import Surface
+from anisomesh.mesh.surface import Surface
+from anisomesh.viz.view import closeup, triangle_stretch, whole_view
 from conftest import torus_arrays
 
 ASPECT = 1.6

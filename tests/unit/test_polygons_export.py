@@ -6,9 +6,10 @@ import numpy as np
 import pytest
 from dual_cases import dual_case
 
-from anisomesh.dual.polygons import N_COLOURS, polygon_mesh, save_polygons
 from anisomesh.errors import MeshFileError
-from anisomesh.surface import shapes
+from anisomesh.io.rvd import N_COLOURS, save_polygons
+from anisomesh.shapes import analytic as shapes
+from anisomesh.voronoi.polygons import polygon_mesh
 
 
 @pytest.fixture(scope="module")

@@ -5,9 +5,9 @@ import pytest
 
 from anisomesh.errors import OptionError
 from anisomesh.evaluation.preservation import feature_preservation
-from anisomesh.surface.features import corners, points_along, sharp_edges
-from anisomesh.surface.mesh import Surface
-from anisomesh.surface.shapes import box, cad_features, cad_part, open_patch, sphere
+from anisomesh.features.detect import corners, points_along, sharp_edges
+from anisomesh.mesh.surface import Surface
+from anisomesh.shapes.analytic import box, cad_features, cad_part, open_patch, sphere
 
 
 def test_a_mesh_keeps_all_its_own_features():

@@ -5,10 +5,10 @@ import pytest
 from scipy.spatial.transform import Rotation
 
 from anisomesh._kernels import pyramid as kernels
-from anisomesh.learn.graph import graph_of
+from anisomesh.learn.models.graph import graph_of
+from anisomesh.mesh.geometry import unit
 from anisomesh.metric.tangent import tangent_frames
-from anisomesh.surface.geometry import unit
-from anisomesh.surface.shapes import torus
+from anisomesh.shapes.analytic import torus
 
 EMPTY = 0.1  # share of the nodes without an edge
 

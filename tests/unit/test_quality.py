@@ -7,11 +7,11 @@ from hypothesis import strategies as st
 from scipy.spatial.transform import Rotation
 
 from anisomesh.errors import MetricError
-from anisomesh.evaluation.quality import anisotropic_quality, transfer_metric_roots
-from anisomesh.metric.tensor import metric_root
-from anisomesh.surface.closest import ClosestPoints
-from anisomesh.surface.mesh import Surface
-from anisomesh.surface.shapes import ellipsoid, sphere
+from anisomesh.mesh.closest_points import ClosestPoints
+from anisomesh.mesh.surface import Surface
+from anisomesh.metric.quality import anisotropic_quality, transfer_metric_roots
+from anisomesh.metric.tensors import metric_root
+from anisomesh.shapes.analytic import ellipsoid, sphere
 
 EQUILATERAL = np.array([[0.0, 0, 0], [1, 0, 0], [0.5, np.sqrt(3) / 2, 0]])
 ONE = np.array([[0, 1, 2]])

@@ -6,9 +6,9 @@ from scipy.spatial.transform import Rotation
 
 from anisomesh.errors import OptionError
 from anisomesh.evaluation.sampled import sampled_measures
-from anisomesh.surface.geometry import unit_frame
-from anisomesh.surface.mesh import Surface
-from anisomesh.surface.shapes import box, sphere, torus
+from anisomesh.mesh.geometry import unit_frame
+from anisomesh.mesh.surface import Surface
+from anisomesh.shapes.analytic import box, sphere, torus
 
 
 def unit(surface):

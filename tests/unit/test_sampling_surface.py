@@ -5,8 +5,8 @@ import numpy as np
 import pytest
 
 from anisomesh.cvt.sampling import resample_by_energy, sample_surface
-from anisomesh.cvt.voronoi import RestrictedVoronoi
-from anisomesh.surface import shapes
+from anisomesh.shapes import analytic as shapes
+from anisomesh.voronoi.restricted import RestrictedVoronoi
 
 
 def test_counts_per_run_of_faces_differ_from_the_expectation_by_less_than_two():

@@ -9,9 +9,9 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from anisomesh._kernels import orientation
-from anisomesh.surface.intersections import self_intersections
-from anisomesh.surface.mesh import Surface
-from anisomesh.surface.shapes import box, cylinder, open_patch, sphere, torus
+from anisomesh.mesh.intersections import self_intersections
+from anisomesh.mesh.surface import Surface
+from anisomesh.shapes.analytic import box, cylinder, open_patch, sphere, torus
 
 
 def minus(a, b):

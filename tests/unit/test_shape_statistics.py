@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 
 from anisomesh.evaluation.shape import shape_statistics
-from anisomesh.surface.mesh import Surface
-from anisomesh.surface.shapes import sphere
+from anisomesh.mesh.surface import Surface
+from anisomesh.shapes.analytic import sphere
 
 
 def test_a_right_triangle():

@@ -4,7 +4,8 @@ import numpy as np
 import pytest
 
 from anisomesh.errors import OptionError
-from anisomesh.surface import shapes, topology
+from anisomesh.mesh import topology
+from anisomesh.shapes import analytic as shapes
 
 # Euler characteristic and number of boundary loops.
 MADE = {

@@ -4,9 +4,9 @@ import numpy as np
 import pytest
 
 from anisomesh.errors import MeshError
-from anisomesh.surface import shapes
-from anisomesh.surface.geometry import thickness, unit_frame
-from anisomesh.surface.mesh import Surface
+from anisomesh.mesh.geometry import thickness, unit_frame
+from anisomesh.mesh.surface import Surface
+from anisomesh.shapes import analytic as shapes
 
 POINTS = np.array([[0.0, 0, 0], [1, 0, 0], [0, 1, 0], [0, 0, 1]])
 

@@ -4,11 +4,11 @@ import numpy as np
 import pytest
 
 from anisomesh.errors import MeshFileError, OptionError
-from anisomesh.surface.mesh import Surface
-from anisomesh.surface.prepare import prepare
-from anisomesh.surface.shapes import box, open_patch
-from anisomesh.surface.subdivide import split_long_edges
-from anisomesh.surface.tagged import edges_within, load_pairs, tagged_edges
+from anisomesh.features.tagged import edges_within, load_pairs, tagged_edges
+from anisomesh.mesh.subdivision import split_long_edges
+from anisomesh.mesh.surface import Surface
+from anisomesh.repair.prepare import prepare
+from anisomesh.shapes.analytic import box, open_patch
 
 
 def grid(n=4):

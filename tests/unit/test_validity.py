@@ -6,9 +6,9 @@ import numpy as np
 import pytest
 from creases import wedge
 
-from anisomesh.evaluation.validity import check_validity, flipped_faces
-from anisomesh.surface.mesh import Surface
-from anisomesh.surface.shapes import box, cylinder, ellipsoid, sphere, torus
+from anisomesh.mesh.surface import Surface
+from anisomesh.mesh.validity import check_validity, flipped_faces
+from anisomesh.shapes.analytic import box, cylinder, ellipsoid, sphere, torus
 
 
 def joined(*surfaces):

@@ -9,8 +9,8 @@ import numpy as np
 PROGRAM = """
 import numpy as np
 from anisomesh._kernels import predicates, warmup
-from anisomesh.cvt.voronoi import RestrictedVoronoi
-from anisomesh.surface import shapes
+from anisomesh.voronoi.restricted import RestrictedVoronoi
+from anisomesh.shapes import analytic as shapes
 surface = shapes.box(n=1)
 sites = np.concatenate([surface.points[:5], 0.5 * (surface.points[:3] + surface.points[3:6])])
 sites = np.concatenate([sites, sites[:2] + 0.01])

@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 if TYPE_CHECKING:
-    from anisomesh.surface.mesh import Surface
+    from anisomesh.mesh.surface import Surface
 
 
 class Metric(StrEnum):

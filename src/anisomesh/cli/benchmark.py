@@ -12,8 +12,8 @@ import typer
 from anisomesh.cli.progress import announce_compilation, progress
 
 if TYPE_CHECKING:
-    from anisomesh.batch.runs import Progress, Row
-    from anisomesh.batch.suite import Suite
+    from anisomesh.bench.runs import Progress, Row
+    from anisomesh.bench.suite import Suite
 
 
 def command(
@@ -36,7 +36,7 @@ def command(
     quiet: Annotated[bool, typer.Option("--quiet", "-q", help="No progress.")] = False,
 ) -> None:
     """Run a SUITE of methods on meshes; a run that was stopped goes on where it was."""
-    from anisomesh.batch.suite import load_suite, shipped_suites
+    from anisomesh.bench.suite import load_suite, shipped_suites
 
     if show_list:
         for name in shipped_suites():
@@ -47,9 +47,9 @@ def command(
     wanted = load_suite(suite)
     if ratios:
         wanted = replace(wanted, ratios=tuple(ratios))
-    from anisomesh.batch.runs import run_suite
-    from anisomesh.batch.tables import markdown, web_page
-    from anisomesh.surface.files import atomic_path
+    from anisomesh.bench.runs import run_suite
+    from anisomesh.bench.tables import markdown, web_page
+    from anisomesh.io.atomic import atomic_path
 
     with progress(quiet) as display:
         announce_compilation(display, "remesh", "evaluate")
@@ -75,7 +75,7 @@ def command(
 
 def _chart(suite: Suite, rows: list[Row]) -> str:
     """Return the chart of the report, nothing where it cannot be drawn."""
-    from anisomesh.batch.charts import trade_off
+    from anisomesh.bench.charts import trade_off
 
     try:
         return trade_off(suite, rows)

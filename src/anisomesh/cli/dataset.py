@@ -14,7 +14,7 @@ from anisomesh.cli.progress import announce_compilation, progress
 from anisomesh.cli.report import counted, table
 
 if TYPE_CHECKING:
-    from anisomesh.learn.manifest import Row
+    from anisomesh.learn.data.manifest import Row
 
 
 class Variant(StrEnum):
@@ -55,8 +55,8 @@ def build_command(
     quiet: Annotated[bool, typer.Option("--quiet", "-q", help="No progress.")] = False,
 ) -> None:
     """Make training items of the meshes of SRC in OUT; a build that was stopped goes on where it was."""
-    from anisomesh.dataset.build import build, sources_of
-    from anisomesh.dataset.make import Recipe
+    from anisomesh.learn.data.build import build, sources_of
+    from anisomesh.learn.data.make import Recipe
 
     if no_variants and variant:
         raise typer.BadParameter("give either --variant or --no-variants")
@@ -74,7 +74,7 @@ def build_command(
 def info_command(folder: Annotated[Path, typer.Argument(metavar="DATASET", help="Folder of a data set.")]) -> None:
     """Say what is in a data set, and what was left out of it and why."""
     from anisomesh.errors import MeshFileError
-    from anisomesh.learn.manifest import MANIFEST, read_manifest
+    from anisomesh.learn.data.manifest import MANIFEST, read_manifest
 
     rows = read_manifest(folder)
     if not rows:

@@ -26,9 +26,9 @@ def command(
     quiet: Annotated[bool, typer.Option("--quiet", "-q", help="No progress and no summary.")] = False,
 ) -> None:
     """Remesh a built-in sample: writes the input, the result, a report and a picture of both."""
-    from anisomesh.picture import require_renderer
-    from anisomesh.surface.io import save
-    from anisomesh.surface.shapes import DEFAULT_SAMPLE, sample
+    from anisomesh.io.meshes import save
+    from anisomesh.shapes.analytic import DEFAULT_SAMPLE, sample
+    from anisomesh.viz import require_renderer
 
     if out.exists() and not out.is_dir():
         raise typer.BadParameter(f"{out} is a file; give the name of a folder")

@@ -26,7 +26,7 @@ from anisomesh.cli.progress import progress
 from anisomesh.cli.report import counted
 
 if TYPE_CHECKING:
-    from anisomesh.surface.mesh import Surface
+    from anisomesh.mesh.surface import Surface
 
 RATIOS = "1 0.6 0.2 0.1"
 
@@ -44,8 +44,8 @@ def gallery(
     quiet: Quiet = False,
 ) -> None:
     """Draw many meshes in a grid, with their names and numbers of vertices."""
-    from anisomesh.picture import Panel
-    from anisomesh.picture import gallery as draw
+    from anisomesh.viz import Panel
+    from anisomesh.viz import gallery as draw
 
     view = camera(direction, up)
     check_file(out)
@@ -93,8 +93,8 @@ def strip(
     quiet: Quiet = False,
 ) -> None:
     """Remesh IN at several numbers of vertices and draw the results in a row, seen from the same side."""
-    from anisomesh.picture import Panel
-    from anisomesh.picture import gallery as draw
+    from anisomesh.viz import Panel
+    from anisomesh.viz import gallery as draw
 
     wanted = _parsed(ratios)
     view = camera(direction, up)

@@ -13,7 +13,7 @@ from anisomesh.cli.job import check_picture, check_place
 from anisomesh.cli.report import counted, table
 
 if TYPE_CHECKING:
-    from anisomesh.surface.mesh import Surface
+    from anisomesh.mesh.surface import Surface
 
 
 class Axis(StrEnum):
@@ -52,7 +52,7 @@ def camera(direction: tuple[float, float, float] | None, up: Axis | None) -> dic
         import numpy as np
 
         from anisomesh.errors import OptionError
-        from anisomesh.picture.camera import camera_axes
+        from anisomesh.viz.camera import camera_axes
 
         try:
             camera_axes(np.zeros((1, 3)), direction, number)

@@ -25,8 +25,8 @@ from anisomesh.cli.job import read, run_remesh
 from anisomesh.cli.progress import Display, progress
 
 if TYPE_CHECKING:
-    from anisomesh.picture import Cells, Colouring
-    from anisomesh.surface.mesh import Surface
+    from anisomesh.mesh.surface import Surface
+    from anisomesh.viz import Cells, Colouring
 
 
 class Colour(StrEnum):
@@ -77,7 +77,7 @@ def command(
             before, after, polygons, warnings = *_read_both(source, remeshed), None, []
         display.note(f"drawing {out}")
         colouring = _colouring(colour, after, before)
-        from anisomesh.picture import side_by_side
+        from anisomesh.viz import side_by_side
 
         side_by_side(before, after, out, values=colouring, cells=polygons, scale=scale, **view)
     rows = [("input", size(before)), ("result", size(after))]
@@ -99,7 +99,7 @@ def _remesh_now(
     source: Path, display: Display, cells: bool, **options: Any
 ) -> tuple[Surface, Surface, Cells | None, list[str]]:
     """Remesh a file; return input and result, the cells if they are wanted, and the warnings."""
-    from anisomesh.picture import voronoi_cells
+    from anisomesh.viz import voronoi_cells
 
     surface, seconds = read(source)
     result, facts = run_remesh(surface, display, name=str(source), load_seconds=seconds, **options)
@@ -108,14 +108,14 @@ def _remesh_now(
 
 def _read_both(source: Path, remeshed: Path) -> tuple[Surface, Surface]:
     """Read input and result; the input repaired as before a remesh, so that it has a metric."""
-    from anisomesh.surface.prepare import prepare
+    from anisomesh.repair.prepare import prepare
 
     before, after = read(source)[0], read(remeshed)[0]
     return prepare(before).surface, after
 
 
 def _colouring(colour: Colour, surface: Surface, reference: Surface) -> Colouring | None:
-    from anisomesh.picture import distance_colouring, quality_colouring, stretch_colouring
+    from anisomesh.viz import distance_colouring, quality_colouring, stretch_colouring
 
     if colour is Colour.stretch:
         return stretch_colouring(surface)

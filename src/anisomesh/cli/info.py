@@ -11,7 +11,7 @@ from anisomesh.cli.job import read
 from anisomesh.cli.report import as_json, counted, describe_validity, table
 
 if TYPE_CHECKING:
-    from anisomesh.surface.mesh import Surface
+    from anisomesh.mesh.surface import Surface
 
 
 def command(
@@ -31,7 +31,7 @@ def describe(surface: Surface) -> dict[str, Any]:
     The genus is given where it is defined, on an oriented manifold: the sum over the components, with every
     boundary loop closed by a disk.
     """
-    from anisomesh.surface.prepare import prepare
+    from anisomesh.repair.prepare import prepare
 
     validity = _validity(surface)
     prepared = prepare(surface)
@@ -55,7 +55,7 @@ def describe(surface: Surface) -> dict[str, Any]:
 
 
 def _validity(surface: Surface) -> dict[str, Any]:
-    from anisomesh.surface import topology
+    from anisomesh.mesh import topology
 
     faces = surface.faces
     nonmanifold_edges = topology.count_nonmanifold_edges(faces)

@@ -13,8 +13,8 @@ from anisomesh.cli.progress import Display, announce_compilation
 from anisomesh.cli.report import write_json
 
 if TYPE_CHECKING:
+    from anisomesh.mesh.surface import Surface
     from anisomesh.result import RemeshResult
-    from anisomesh.surface.mesh import Surface
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -45,7 +45,7 @@ class Outputs:
             check_place(path)
         if len({path.resolve() for path in self.paths}) < len(self.paths):
             raise typer.BadParameter("two outputs have the same file name; give each its own")
-        from anisomesh.surface.io import FORMATS
+        from anisomesh.io.meshes import FORMATS
 
         if self.mesh.suffix.lower() not in FORMATS:
             raise typer.BadParameter(f"{self.mesh}: expected a file name ending in one of {', '.join(sorted(FORMATS))}")
@@ -56,7 +56,7 @@ class Outputs:
 
     def write(self, result: RemeshResult, facts: dict[str, Any], display: Display) -> None:
         """Write the files, each by way of a temporary file that is renamed when it is complete."""
-        from anisomesh.surface.io import save
+        from anisomesh.io.meshes import save
 
         display.note(f"writing {', '.join(str(path) for path in self.paths)}")
         save(result.surface, self.mesh)
@@ -67,7 +67,7 @@ class Outputs:
 
             save_rvd(result, self.rvd)
         if self.picture is not None:
-            from anisomesh.picture import side_by_side
+            from anisomesh.viz import side_by_side
 
             side_by_side(result.prepared, result.surface, self.picture)
 
@@ -96,7 +96,7 @@ def check_picture(path: Path, option: str) -> None:
     AnisomeshError
         If nothing can be drawn on this machine.
     """
-    from anisomesh.picture import FORMATS, require_renderer
+    from anisomesh.viz import FORMATS, require_renderer
 
     if path.suffix.lower() not in FORMATS:
         raise typer.BadParameter(f"{option} {path}: expected a file name ending in {' or '.join(FORMATS)}")
@@ -105,7 +105,7 @@ def check_picture(path: Path, option: str) -> None:
 
 def read(path: Path) -> tuple[Surface, float]:
     """Read a mesh file; return it and the seconds it took."""
-    from anisomesh.surface.io import load
+    from anisomesh.io.meshes import load
 
     start = time.perf_counter()
     surface = load(path)

@@ -111,7 +111,7 @@ def command(
     with progress(quiet) as display:
         surface, seconds = read(source)
         if features is not None:
-            from anisomesh.surface.tagged import load_pairs
+            from anisomesh.features.tagged import load_pairs
 
             options["features"] = load_pairs(features)
         options |= {"n_vertices": n_vertices, "ratio": ratio}

@@ -35,7 +35,7 @@ def _finite(value: Any) -> Any:
 
 def write_json(report: dict[str, Any], path: Path) -> None:
     """Write the report as JSON, in full or not at all."""
-    from anisomesh.surface.files import atomic_path
+    from anisomesh.io.atomic import atomic_path
 
     with atomic_path(path) as temporary:
         Path(temporary).write_text(as_json(report) + "\n", encoding="utf-8")

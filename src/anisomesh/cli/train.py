@@ -30,10 +30,10 @@ def command(
     require_torch()
     import torch
 
-    from anisomesh.learn.config import load_training
-    from anisomesh.learn.manifest import files_of
-    from anisomesh.learn.run import WEIGHTS
-    from anisomesh.learn.train import train
+    from anisomesh.learn.data.manifest import files_of
+    from anisomesh.learn.training.config import load_training
+    from anisomesh.learn.training.run import WEIGHTS
+    from anisomesh.learn.training.train import train
 
     torch.set_num_threads(threads)
     first = int(os.environ.get("RANK", "0")) == 0  # of those that torchrun starts, only one talks

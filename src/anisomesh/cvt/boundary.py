@@ -7,12 +7,12 @@ from dataclasses import dataclass
 import numpy as np
 
 from anisomesh._arrays import Points, Sites
-from anisomesh.cvt.arcs import Arcs, Mask, arcs_of
-from anisomesh.cvt.diagram import Diagram
-from anisomesh.cvt.voronoi import RestrictedVoronoi
-from anisomesh.surface.boundary import BoundaryCurves, boundary_curves
-from anisomesh.surface.curves import Floats, Ints
-from anisomesh.surface.mesh import Surface
+from anisomesh.features.boundary import BoundaryCurves, boundary_curves
+from anisomesh.features.polylines import Floats, Ints
+from anisomesh.mesh.surface import Surface
+from anisomesh.voronoi.diagram import Diagram
+from anisomesh.voronoi.intervals import Arcs, Mask, arcs_of
+from anisomesh.voronoi.restricted import RestrictedVoronoi
 
 _REACH = 0.75  # of the distance between sites: over which the turn of a corner is measured
 _SAME = 1e-6  # of the distance between sites: a site so near to a corner is the corner

@@ -9,13 +9,13 @@ from scipy.sparse import coo_array
 from scipy.sparse.csgraph import connected_components
 
 from anisomesh._arrays import EmbeddedPoints, Sites
-from anisomesh.cvt.arcs import Arcs, Mask, arcs_of, changes
-from anisomesh.cvt.diagram import Diagram
-from anisomesh.cvt.voronoi import RestrictedVoronoi
-from anisomesh.surface.creases import CreaseCurves, crease_curves
-from anisomesh.surface.curves import Ints
-from anisomesh.surface.features import corners
-from anisomesh.surface.mesh import Surface
+from anisomesh.features.creases import CreaseCurves, crease_curves
+from anisomesh.features.detect import corners
+from anisomesh.features.polylines import Ints
+from anisomesh.mesh.surface import Surface
+from anisomesh.voronoi.diagram import Diagram
+from anisomesh.voronoi.intervals import Arcs, Mask, arcs_of, changes
+from anisomesh.voronoi.restricted import RestrictedVoronoi
 
 _SHORT_END = 0.1  # distances between sites: a loose end of a crease up to here is none
 _MIN_NETWORK, _MIN_PIECE, _LOOSE = 2.0, 0.5, 2.5  # the same that a network has, each of its curves, each loose end

@@ -5,12 +5,12 @@ from __future__ import annotations
 import numpy as np
 
 from anisomesh._arrays import Sites
-from anisomesh.cvt.arcs import Mask
 from anisomesh.cvt.boundary import Boundary
 from anisomesh.cvt.creases import Creases
 from anisomesh.cvt.optimise import lloyd
-from anisomesh.cvt.voronoi import RestrictedVoronoi
-from anisomesh.surface.mesh import Surface
+from anisomesh.mesh.surface import Surface
+from anisomesh.voronoi.intervals import Mask
+from anisomesh.voronoi.restricted import RestrictedVoronoi
 
 _STEPS = 5  # Lloyd steps after which the sites on boundary and creases are spread
 

@@ -11,8 +11,8 @@ import numpy as np
 import numpy.typing as npt
 
 from anisomesh._arrays import Sites
-from anisomesh.clock import Stop, never
-from anisomesh.cvt.voronoi import Evaluation, RestrictedVoronoi
+from anisomesh.deadline import Stop, never
+from anisomesh.voronoi.restricted import Evaluation, RestrictedVoronoi
 
 _ARMIJO = 1e-4
 _WOLFE = 0.9

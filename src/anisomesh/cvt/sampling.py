@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from anisomesh._arrays import EmbeddedPoints, Faces, FaceScalars, Sites
-from anisomesh.cvt.voronoi import RestrictedVoronoi
+from anisomesh.voronoi.restricted import RestrictedVoronoi
 
 
 def sample_surface(

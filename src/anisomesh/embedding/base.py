@@ -11,7 +11,7 @@ import numpy.typing as npt
 
 from anisomesh._arrays import EmbeddedPoints, FaceScalars, PointTensors
 from anisomesh.embedding.gradient import FaceGradient, FaceTensors, larger_eigenvalue
-from anisomesh.surface.mesh import Surface
+from anisomesh.mesh.surface import Surface
 
 
 class EmbeddingStatus(StrEnum):

@@ -10,8 +10,8 @@ from anisomesh.embedding.base import Embedding, EmbeddingStatus, stretch_statist
 from anisomesh.embedding.gradient import FaceGradient, FaceTensors, eigen_2x2, face_gradient, face_tensors
 from anisomesh.embedding.poisson import poisson_solver
 from anisomesh.errors import OptionError
-from anisomesh.surface.geometry import sums_at_points
-from anisomesh.surface.mesh import Surface
+from anisomesh.mesh.geometry import sums_at_points
+from anisomesh.mesh.surface import Surface
 
 _POSITION_SHARE = 0.01
 _INVARIANT_SHARE = 0.2

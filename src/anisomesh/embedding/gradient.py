@@ -9,8 +9,8 @@ import numpy.typing as npt
 from scipy import sparse
 
 from anisomesh._arrays import FaceMask, FaceScalars, PointTensors
-from anisomesh.surface.geometry import unit
-from anisomesh.surface.mesh import Surface
+from anisomesh.mesh.geometry import unit
+from anisomesh.mesh.surface import Surface
 
 _FLAT = 1e-10
 

@@ -11,8 +11,8 @@ from scipy.sparse import linalg
 
 from anisomesh.embedding.gradient import FaceGradient
 from anisomesh.embedding.ordering import nested_dissection
-from anisomesh.surface.mesh import Surface
-from anisomesh.surface.topology import connected_components
+from anisomesh.mesh.surface import Surface
+from anisomesh.mesh.topology import connected_components
 
 Columns = npt.NDArray[np.float64]
 Solve = Callable[[Columns], Columns]

@@ -9,8 +9,8 @@ import igl
 import numpy as np
 import numpy.typing as npt
 
-from anisomesh.surface.features import points_along
-from anisomesh.surface.mesh import Surface
+from anisomesh.features.detect import points_along
+from anisomesh.mesh.surface import Surface
 
 _FINENESS = 1e-4  # of the diagonal of the reference between sample points
 _MOST_POINTS = 1_000_000

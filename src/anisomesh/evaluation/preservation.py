@@ -9,8 +9,8 @@ import numpy as np
 from scipy.spatial import cKDTree
 
 from anisomesh.errors import OptionError
-from anisomesh.surface.features import corners, points_along, sharp_edges
-from anisomesh.surface.mesh import Surface
+from anisomesh.features.detect import corners, points_along, sharp_edges
+from anisomesh.mesh.surface import Surface
 
 DEFAULT_TOLERANCE = 0.004
 _FINENESS = 10  # points on creases per tolerance

@@ -8,17 +8,17 @@ from typing import Any
 import numpy as np
 
 from anisomesh.evaluation.boundary import BoundaryDistance, boundary_distance
-from anisomesh.evaluation.distance import SurfaceDistance, surface_distance
 from anisomesh.evaluation.preservation import FeaturePreservation, feature_preservation
-from anisomesh.evaluation.quality import quality_on
 from anisomesh.evaluation.sampled import CREASE_ANGLE, DEFAULT_SAMPLES, SampledMeasures, sampled_measures
 from anisomesh.evaluation.shape import ShapeStatistics, shape_statistics
-from anisomesh.evaluation.validity import Validity, check_validity
-from anisomesh.surface.closest import ClosestPoints
-from anisomesh.surface.convert import as_surface
-from anisomesh.surface.geometry import unit_frame
-from anisomesh.surface.mesh import Surface
-from anisomesh.surface.prepare import prepare
+from anisomesh.io.convert import as_surface
+from anisomesh.mesh.closest_points import ClosestPoints
+from anisomesh.mesh.distance import SurfaceDistance, surface_distance
+from anisomesh.mesh.geometry import unit_frame
+from anisomesh.mesh.surface import Surface
+from anisomesh.mesh.validity import Validity, check_validity
+from anisomesh.metric.quality import quality_on
+from anisomesh.repair.prepare import prepare
 
 
 @dataclass(frozen=True, kw_only=True)

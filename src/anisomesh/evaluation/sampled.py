@@ -9,9 +9,9 @@ from scipy.spatial import cKDTree
 
 from anisomesh._arrays import Floats
 from anisomesh.errors import OptionError
-from anisomesh.evaluation.sampling import points_on_edges, points_on_faces
-from anisomesh.surface.features import sharp_edges
-from anisomesh.surface.mesh import Surface
+from anisomesh.features.detect import sharp_edges
+from anisomesh.mesh.sampling import points_on_edges, points_on_faces
+from anisomesh.mesh.surface import Surface
 
 DEFAULT_SAMPLES = 100_000
 F1_DISTANCE = 0.004  # of the paper, at bounding-box diagonal 1

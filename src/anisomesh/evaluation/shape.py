@@ -8,8 +8,8 @@ from typing import Any
 import numpy as np
 
 from anisomesh._arrays import FaceScalars
-from anisomesh.surface.geometry import corner_angles
-from anisomesh.surface.mesh import Surface
+from anisomesh.mesh.geometry import corner_angles
+from anisomesh.mesh.surface import Surface
 
 
 @dataclass(frozen=True, kw_only=True)

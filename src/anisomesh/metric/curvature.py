@@ -11,10 +11,10 @@ from scipy import sparse
 
 from anisomesh._arrays import Edges, Faces, PointMask, PointVectors
 from anisomesh.errors import OptionError
+from anisomesh.mesh.geometry import unit
+from anisomesh.mesh.surface import Surface
+from anisomesh.mesh.topology import connected_components, edges_of
 from anisomesh.metric.tangent import tangent_frames, unit_normals
-from anisomesh.surface.geometry import unit
-from anisomesh.surface.mesh import Surface
-from anisomesh.surface.topology import connected_components, edges_of
 
 _NEEDLE = 1e-6
 _CANCELLED = 1e-5

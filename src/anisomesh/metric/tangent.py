@@ -7,8 +7,8 @@ import numpy.typing as npt
 from scipy import sparse
 
 from anisomesh._arrays import PointTensors, PointVectors
-from anisomesh.surface.geometry import unit
-from anisomesh.surface.mesh import Surface
+from anisomesh.mesh.geometry import unit
+from anisomesh.mesh.surface import Surface
 
 Frames = npt.NDArray[np.float64]
 LineField = npt.NDArray[np.complex128]

@@ -1,0 +1,103 @@
+"""The meshes of a suite: files of the data folder, and shapes made by code."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+
+from anisomesh.bench.suite import Suite
+from anisomesh.errors import OptionError
+from anisomesh.io.meshes import load
+from anisomesh.mesh.surface import Surface
+from anisomesh.shapes.analytic import sphere, torus, twisted_ring
+from anisomesh.shapes.cad_part import cad_part
+
+
+@dataclass(frozen=True)
+class Input:
+    """A mesh by name, loaded or made when it is its turn."""
+
+    name: str
+    make: Callable[[], Surface]
+
+
+def inputs_of(suite: Suite, data: Path | None) -> list[Input]:
+    """Return the meshes of a suite, in the order of their names.
+
+    Parameters
+    ----------
+    suite
+        The suite.
+    data
+        The folder that its patterns refer to.
+
+    Raises
+    ------
+    OptionError
+        If a pattern is there and no data folder, or a pattern matches no file.
+    """
+    found = []
+    for pattern in suite.meshes:
+        if data is None:
+            raise OptionError(
+                f"suite {suite.name} needs the meshes {pattern}; name their folder with --data or ANISOMESH_DATA"
+            )
+        paths = sorted(data.glob(pattern))
+        if not paths:
+            raise OptionError(f"suite {suite.name} needs the meshes {pattern}, and {data} has none of them")
+        found += [Input(str(path.relative_to(data)), _loader(path)) for path in paths]
+    found += [Input(spec, _maker(spec)) for spec in suite.shapes]
+    return list({entry.name: entry for entry in found}.values())
+
+
+def make_shape(spec: str) -> Surface:
+    """Return a shape made by code.
+
+    Parameters
+    ----------
+    spec
+        ``sphere:N``, ``ring:N`` or ``part:N`` with about N points, or ``torus:R`` whose triangles on the outer equator
+        are stretched R times, as in the paper's synthetic test.
+
+    Raises
+    ------
+    OptionError
+        If the name is unknown or the number is out of range.
+    """
+    name, _, number = spec.partition(":")
+    makers: dict[str, Callable[[float], Surface]] = {
+        "sphere": lambda n: sphere(max(0, round(np.log(n / 10.0) / np.log(4.0)))),
+        "ring": _ring,
+        "part": lambda n: cad_part(max(2, round(24 * np.sqrt(n / 8_396)))),
+        "torus": _stretched_torus,
+    }
+    try:
+        value = float(number)
+    except ValueError:
+        value = np.nan
+    if name not in makers or not value > 1.0:
+        raise OptionError(f"shape {spec!r}; expected one of {', '.join(makers)}, a colon and a number above 1")
+    return makers[name](value)
+
+
+def _ring(n: float) -> Surface:
+    finer = np.sqrt(n / 5440)
+    return twisted_ring(n_major=round(160 * finer), n_section=(round(12 * finer), round(5 * finer)))
+
+
+def _stretched_torus(ratio: float) -> Surface:
+    """Return a torus with (major + minor) / minor = ratio^2, its faces about square, about 6,000 points."""
+    minor = 1.0 / (ratio**2 - 1.0)
+    n_minor = max(12, round(np.sqrt(6_000 * minor)))
+    return torus(1.0, minor, max(24, round(6_000 / n_minor)), n_minor)
+
+
+def _loader(path: Path) -> Callable[[], Surface]:
+    return lambda: load(path)
+
+
+def _maker(spec: str) -> Callable[[], Surface]:
+    return lambda: make_shape(spec)

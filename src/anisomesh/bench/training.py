@@ -1,0 +1,71 @@
+"""Networks that a suite compares: trained before the first run, each in a folder of its own."""
+
+from __future__ import annotations
+
+import hashlib
+import json
+from collections.abc import Callable
+from dataclasses import replace
+from pathlib import Path
+
+from anisomesh.bench.suite import Method, Suite
+from anisomesh.errors import OptionError
+from anisomesh.learn import require_torch
+
+
+def trained(
+    suite: Suite, out: Path, items: Path | None, on_epoch: Callable[[str], None] = lambda text: None
+) -> dict[str, Path]:
+    """Return the weights of the networks of a suite by the names of its methods, trained where they are not there.
+
+    Parameters
+    ----------
+    suite
+        The suite; methods without a training have no weights.
+    out
+        Folder of the trainings; those that were stopped go on.
+    items
+        Folder of the data set.
+    on_epoch
+        Called with a line of text after every epoch.
+
+    Raises
+    ------
+    OptionError
+        If there is something to train and no data set, or a training has an unknown key.
+    LearningError, WeightsError, DivergedError, MeshFileError
+        If torch is missing, a checkpoint or the data set damaged, or a training ends in no number.
+    """
+    methods = [method for method in suite.methods if method.training is not None]
+    if not methods:
+        return {}
+    if items is None:
+        raise OptionError(f"suite {suite.name} trains networks; name a data set with --items")
+    require_torch()
+    from anisomesh.learn.data.manifest import files_of
+    from anisomesh.learn.training.config import TrainingOptions, parse_training
+    from anisomesh.learn.training.run import CHECKPOINT, WEIGHTS
+    from anisomesh.learn.training.train import train
+
+    files = files_of(items)
+    runs: dict[str, TrainingOptions] = {}
+    for method in methods:  # all tables are read before the first network is trained
+        table = {"data": str(items), "out": "", **(method.training or {})}
+        options = parse_training(f"{suite.name}: training of {method.name!r}", table)
+        runs[method.name] = replace(options, out=str(out / _folder(method)))
+    found = {}
+    for name, options in runs.items():
+
+        def tell(row: dict[str, object], name: str = name, epochs: int = options.epochs) -> None:
+            on_epoch(f"{name}: epoch {row['epoch']} of {epochs}, loss {row['loss']:.4f}")
+
+        folder = Path(options.out)
+        train(options, files, resume=(folder / CHECKPOINT).exists(), on_row=tell)
+        found[name] = folder / WEIGHTS
+    return found
+
+
+def _folder(method: Method) -> str:
+    """Return a name for the folder of a training, another one when the training is changed."""
+    mark = hashlib.sha256(json.dumps([method.name, method.training], sort_keys=True).encode()).hexdigest()[:8]
+    return "".join(letter if letter.isalnum() else "-" for letter in method.name) + "-" + mark

@@ -1,1 +1,0 @@
-"""From the Voronoi diagram to a triangle mesh: cell components, dual triangles, defects, refinement."""

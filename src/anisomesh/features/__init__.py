@@ -1,0 +1,1 @@
+"""Creases and boundaries: detection, tracing into polylines, selection."""

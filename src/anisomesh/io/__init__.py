@@ -1,0 +1,1 @@
+"""Files and other libraries: mesh formats, conversion, export of Voronoi diagrams."""

@@ -1,0 +1,1 @@
+"""Data sets: items, and building them from meshes."""

@@ -1,0 +1,1 @@
+"""Triangle meshes: data, connectivity, geometry, closest points, intersections, subdivision, validity."""

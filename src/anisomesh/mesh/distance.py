@@ -1,0 +1,104 @@
+"""Distances between two surfaces, from points of each to the other surface itself (no sampling floor)."""
+
+from __future__ import annotations
+
+from dataclasses import asdict, dataclass
+from typing import Any
+
+import numpy as np
+
+from anisomesh._arrays import Floats, Points
+from anisomesh.errors import OptionError
+from anisomesh.mesh.closest_points import ClosestPoints
+from anisomesh.mesh.sampling import points_on_faces
+from anisomesh.mesh.surface import Surface
+
+
+@dataclass(frozen=True, kw_only=True)
+class SurfaceDistance:
+    """Distances between surfaces a and b in model units; ``ab`` goes from points of a to the surface b.
+
+    Attributes
+    ----------
+    max_ab, max_ba
+        Largest distance found (a lower bound of the one-sided Hausdorff distance).
+    mean_square_ab, mean_square_ba
+        Mean squared distance over the area, in units squared.
+    """
+
+    max_ab: float
+    max_ba: float
+    mean_square_ab: float
+    mean_square_ba: float
+
+    @property
+    def rms_ab(self) -> float:
+        """Root mean squared distance from a to b."""
+        return float(np.sqrt(self.mean_square_ab))
+
+    @property
+    def rms_ba(self) -> float:
+        """Root mean squared distance from b to a."""
+        return float(np.sqrt(self.mean_square_ba))
+
+    @property
+    def hausdorff(self) -> float:
+        """The larger of the two maxima."""
+        return max(self.max_ab, self.max_ba)
+
+    @property
+    def rms(self) -> float:
+        """Root of the mean of the two mean squared distances."""
+        return float(np.sqrt(0.5 * (self.mean_square_ab + self.mean_square_ba)))
+
+    def as_dict(self) -> dict[str, Any]:
+        """Return all values under their names, for JSON."""
+        derived = {name: getattr(self, name) for name in ("rms_ab", "rms_ba", "rms", "hausdorff")}
+        return {**asdict(self), **derived}
+
+
+def surface_distance(
+    a: Surface, b: Surface, samples: int = 100_000, seed: int | np.random.Generator = 0
+) -> SurfaceDistance:
+    """Return the distances between two surfaces both ways.
+
+    Parameters
+    ----------
+    a, b
+        The surfaces, in the same units.
+    samples
+        Number of points drawn uniformly by area on each.
+    seed
+        Seed or generator of the sample; the same seed gives the same result.
+
+    Raises
+    ------
+    OptionError
+        If there is no sample.
+
+    Notes
+    -----
+    Distances go to the closest point of the other surface, exactly, so a surface is at distance zero from itself,
+    unlike in the sample-to-sample measures. The mean squares are over the samples; the maxima also over every point
+    that a face uses and every midpoint of an edge, where chords are usually farthest off. About 1 s at 100,000
+    samples for surfaces of 10,000 faces.
+    """
+    if samples < 1:
+        raise OptionError(f"samples is {samples}; expected at least 1")
+    rng = np.random.default_rng(seed)
+    max_ab, mean_ab = _one_way(a, b, samples, rng)
+    max_ba, mean_ba = _one_way(b, a, samples, rng)
+    return SurfaceDistance(max_ab=max_ab, max_ba=max_ba, mean_square_ab=mean_ab, mean_square_ba=mean_ba)
+
+
+def squared_distances(points: Points, surface: Surface) -> Floats:
+    """Return the squared distance (n,) of each point to the closest point of a surface."""
+    return ClosestPoints(surface).squared_distances(points)
+
+
+def _one_way(a: Surface, b: Surface, samples: int, rng: np.random.Generator) -> tuple[float, float]:
+    corners = a.points[np.unique(a.faces)]
+    midpoints = a.points[a.edges].mean(axis=1)
+    queries = np.concatenate([points_on_faces(a, samples, rng)[0], corners, midpoints])
+    squared = squared_distances(queries, b)
+    return float(np.sqrt(squared.max())), float(squared[:samples].mean())

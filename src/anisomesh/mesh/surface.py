@@ -1,0 +1,165 @@
+"""The frozen triangle mesh that every stage takes and returns."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cached_property
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+
+from anisomesh._arrays import (
+    EdgeIndices,
+    Edges,
+    FaceIndices,
+    Faces,
+    FaceScalars,
+    FaceVectors,
+    PointMask,
+    Points,
+    PointVectors,
+)
+from anisomesh.errors import MeshError
+from anisomesh.mesh import geometry, topology
+
+
+@dataclass(frozen=True, eq=False)
+class Surface:
+    """A triangle mesh in 3-D; derived tables are computed once, on first use.
+
+    Parameters
+    ----------
+    points
+        Coordinates (V, 3) in model units; copied to float64.
+    faces
+        Point indices (F, 3), counter-clockwise seen from outside; copied to int32.
+
+    Raises
+    ------
+    MeshError
+        If the shapes are wrong, a coordinate is not finite, an index is out of range, or there is no face.
+
+    Notes
+    -----
+    Column ``c`` of the per-face tables belongs to the side *opposite* corner ``c``, that is the side from
+    corner ``c + 1`` to corner ``c + 2``. The arrays are read-only, so a surface can be shared between stages
+    and threads.
+    """
+
+    points: Points
+    faces: Faces
+
+    def __post_init__(self) -> None:
+        points, faces = _validated(self.points, self.faces)
+        object.__setattr__(self, "points", points)
+        object.__setattr__(self, "faces", faces)
+
+    def __repr__(self) -> str:
+        return f"Surface({self.n_points:,} points, {self.n_faces:,} faces)"
+
+    @property
+    def n_points(self) -> int:
+        """Number of points."""
+        return len(self.points)
+
+    @property
+    def n_faces(self) -> int:
+        """Number of faces."""
+        return len(self.faces)
+
+    @cached_property
+    def _edge_tables(self) -> tuple[Edges, FaceIndices]:
+        return topology.edges_of(self.faces)
+
+    @property
+    def edges(self) -> Edges:
+        """Unique undirected edges (E, 2), lower index first, in lexicographic order."""
+        return self._edge_tables[0]
+
+    @property
+    def face_edges(self) -> FaceIndices:
+        """Edge opposite each corner, (F, 3)."""
+        return self._edge_tables[1]
+
+    @cached_property
+    def edge_face_count(self) -> npt.NDArray[np.int32]:
+        """Number of faces at each edge, (E,): 1 on the boundary, 2 inside, more where not manifold."""
+        return np.bincount(self.face_edges.ravel(), minlength=len(self.edges)).astype(np.int32)
+
+    @cached_property
+    def edge_faces(self) -> EdgeIndices:
+        """The two faces at each edge (E, 2), the second -1 on the boundary; -1, -1 where not manifold."""
+        return topology.edge_faces(self.face_edges, len(self.edges))
+
+    @cached_property
+    def on_boundary(self) -> PointMask:
+        """Which points (V,) are ends of an edge with one face."""
+        mask = np.zeros(self.n_points, dtype=bool)
+        mask[self.edges[self.edge_face_count == 1]] = True
+        return mask
+
+    @cached_property
+    def face_neighbours(self) -> FaceIndices:
+        """Face across the side opposite each corner (F, 3); -1 at a boundary or a non-manifold edge."""
+        return topology.face_neighbours(self.face_edges, self.edge_faces)
+
+    @cached_property
+    def face_normals(self) -> FaceVectors:
+        """Unit normals (F, 3); zero where a face has no area."""
+        return geometry.unit(geometry.face_cross(self.points, self.faces))
+
+    @cached_property
+    def face_areas(self) -> FaceScalars:
+        """Areas (F,) in model units squared."""
+        return np.asarray(0.5 * np.linalg.norm(geometry.face_cross(self.points, self.faces), axis=1))
+
+    @cached_property
+    def point_normals(self) -> PointVectors:
+        """Area-weighted unit normals (V, 3); zero at a point without faces."""
+        return geometry.point_normals(self.points, self.faces)
+
+    @cached_property
+    def area(self) -> float:
+        """Total area in model units squared."""
+        return float(self.face_areas.sum())
+
+    @cached_property
+    def diagonal(self) -> float:
+        """Length of the diagonal of the bounding box, in model units."""
+        return float(np.linalg.norm(np.ptp(self.points, axis=0)))
+
+    @cached_property
+    def edge_lengths(self) -> npt.NDArray[np.float64]:
+        """Length of every edge (E,), in model units."""
+        return np.asarray(np.linalg.norm(self.points[self.edges[:, 0]] - self.points[self.edges[:, 1]], axis=1))
+
+    def with_points(self, points: npt.NDArray[Any]) -> Surface:
+        """Return the same faces on other points (V, 3)."""
+        return Surface(np.asarray(points), self.faces)
+
+
+def _validated(points: npt.NDArray[Any], faces: npt.NDArray[Any]) -> tuple[Points, Faces]:
+    points = np.array(points, dtype=np.float64, order="C")
+    faces = np.asarray(faces)
+    if points.ndim != 2 or points.shape[1] != 3:
+        raise MeshError(f"points has shape {points.shape}; expected (V, 3)")
+    if faces.ndim != 2 or faces.shape[1] != 3:
+        raise MeshError(f"faces has shape {faces.shape}; expected (F, 3): triangulate polygons first")
+    if len(faces) == 0:
+        raise MeshError("the mesh has no face; a surface needs at least one triangle")
+    if not np.issubdtype(faces.dtype, np.integer):
+        raise MeshError(f"faces has dtype {faces.dtype}; expected integers")
+    bad = np.flatnonzero(~np.isfinite(points).all(axis=1))
+    if len(bad):
+        raise MeshError(f"points[{bad[0]}] = {points[bad[0]].tolist()} is not finite ({len(bad)} such points)")
+    bad = np.flatnonzero(((faces < 0) | (faces >= len(points))).any(axis=1))
+    if len(bad):
+        raise MeshError(
+            f"faces[{bad[0]}] = {faces[bad[0]].tolist()} refers to a point out of range; "
+            f"there are {len(points)} points ({len(bad)} such faces)"
+        )
+    faces = np.array(faces, dtype=np.int32, order="C")
+    points.flags.writeable = False
+    faces.flags.writeable = False
+    return points, faces

@@ -1,0 +1,1 @@
+"""From any triangle soup to oriented manifold surfaces."""

@@ -1,0 +1,1 @@
+"""Shapes made by code: analytic surfaces, machine parts, lofts, implicit surfaces."""

@@ -1,0 +1,192 @@
+"""Exact test shapes made by code; closed ones have their normals outside."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+import numpy as np
+import numpy.typing as npt
+
+from anisomesh.errors import OptionError
+from anisomesh.mesh import topology
+from anisomesh.mesh.geometry import unit
+from anisomesh.mesh.surface import Surface
+from anisomesh.shapes import patches
+from anisomesh.shapes.cad_part import CadFeatures, cad_features, cad_part
+
+__all__ = [
+    "SAMPLES",
+    "CadFeatures",
+    "box",
+    "cad_features",
+    "cad_part",
+    "cylinder",
+    "ellipsoid",
+    "open_patch",
+    "sample",
+    "sphere",
+    "torus",
+    "twisted_ring",
+]
+
+DEFAULT_SAMPLE = "part"
+
+
+def sphere(subdivisions: int = 3, radius: float = 1.0) -> Surface:
+    """Return an icosahedron subdivided so many times, on the sphere: 20 * 4^subdivisions faces."""
+    golden = 0.5 * (1 + np.sqrt(5))
+    corners = [(0.0, s, t * golden) for s in (-1, 1) for t in (-1, 1)]
+    points = unit(np.array([np.roll(corner, k) for k in range(3) for corner in corners]))
+    # Every three mutually nearest points (they include an edge, not a diagonal) make a face.
+    near = np.linalg.norm(points[:, None] - points[None], axis=2) < 1.2
+    i, j, k = np.nonzero(near[:, :, None] & near[None] & near[:, None])
+    faces = np.stack([i, j, k], axis=1)[(i < j) & (j < k)]
+    inward = np.linalg.det(points[faces]) < 0
+    faces[inward] = faces[inward][:, ::-1]
+    for _ in range(subdivisions):
+        edges, face_edges = topology.edges_of(faces)
+        middles = len(points) + face_edges
+        points = np.concatenate([points, unit(points[edges[:, 0]] + points[edges[:, 1]])])
+        a, b, c = faces.T
+        p, q, r = middles.T
+        faces = np.stack([a, r, q, r, b, p, q, p, c, p, q, r], axis=1).reshape(-1, 3)
+    return Surface(radius * points, faces)
+
+
+def ellipsoid(semi_axes: tuple[float, float, float] = (1.0, 0.5, 0.25), subdivisions: int = 4) -> Surface:
+    """Return an icosphere scaled to the semi-axes."""
+    ball = sphere(subdivisions)
+    return ball.with_points(ball.points * np.asarray(semi_axes))
+
+
+def torus(major: float = 1.0, minor: float = 0.35, n_major: int = 72, n_minor: int = 24) -> Surface:
+    """Return a torus around the z axis; ``major`` is the radius of the centre line."""
+    _at_least(3, n_major=n_major, n_minor=n_minor)
+    u, v = np.meshgrid(_turn(n_major), _turn(n_minor), indexing="ij")
+    ring = major + minor * np.cos(v)
+    points = np.stack([ring * np.cos(u), ring * np.sin(u), minor * np.sin(v)], axis=-1)
+    return Surface(points.reshape(-1, 3), patches.grid_faces(n_major, n_minor, wrap_rows=True, wrap_columns=True))
+
+
+def cylinder(
+    radius: float = 0.4, height: float = 2.0, n_around: int = 36, n_along: int = 28, closed: bool = True
+) -> Surface:
+    """Return a cylinder around the z axis from z = 0; with flat ends if ``closed``."""
+    _at_least(3, n_around=n_around)
+    _at_least(1, n_along=n_along)
+    rim = patches.circle(radius, n_around)
+    levels = height * (np.arange(n_along + 1) / n_along)
+    wall = np.concatenate([np.pad(rim, ((0, 0), (0, 1)), constant_values=z) for z in levels])
+    parts = [(wall, patches.grid_faces(n_along + 1, n_around, wrap_columns=True)[:, ::-1])]
+    if closed:
+        flat, faces = patches.disk(radius, n_around)
+        parts += [(flat, faces[:, ::-1]), (flat + np.array([0.0, 0.0, height]), faces)]
+    points, faces, _ = patches.joined(parts)
+    return Surface(points, faces)
+
+
+def box(extent: tuple[float, float, float] = (1.0, 1.0, 1.0), n: int = 8) -> Surface:
+    """Return a box from the origin, each of its sides a grid of n x n cells."""
+    _at_least(1, n=n)
+    ticks = np.arange(n + 1) / n
+    u, v = (table.ravel() for table in np.meshgrid(ticks, ticks, indexing="ij"))
+    faces = patches.grid_faces(n + 1, n + 1)
+    sides = []
+    for axis in range(3):
+        for level, oriented in ((0.0, faces[:, ::-1]), (1.0, faces)):
+            points = np.empty((len(u), 3))
+            points[:, axis], points[:, axis - 2], points[:, axis - 1] = level, u, v
+            sides.append((points * np.asarray(extent), oriented))
+    points, faces, _ = patches.joined(sides)
+    return Surface(points, faces)
+
+
+def open_patch(
+    height: Callable[[npt.NDArray[np.float64], npt.NDArray[np.float64]], npt.NDArray[np.float64]],
+    n: int = 40,
+    half_width: float = 1.0,
+) -> Surface:
+    """Return the graph z = height(x, y) over a square around the origin, with n x n cells and a boundary."""
+    _at_least(1, n=n)
+    ticks = half_width * (2 * np.arange(n + 1) / n - 1)
+    x, y = (table.ravel() for table in np.meshgrid(ticks, ticks, indexing="ij"))
+    return Surface(np.stack([x, y, height(x, y) + 0 * x], axis=1), patches.grid_faces(n + 1, n + 1))
+
+
+def twisted_ring(
+    major: float = 1.0,
+    section: tuple[float, float] = (0.7, 0.3),
+    half_turns: int = 3,
+    n_major: int = 160,
+    n_section: tuple[int, int] = (12, 5),
+) -> Surface:
+    """Return a ring of rectangular section that twists while it goes around; its four edges are sharp.
+
+    Parameters
+    ----------
+    major
+        Radius of the centre line, around the z axis.
+    section
+        Sides of the rectangle.
+    half_turns
+        Half turns of the section on the way around.
+    n_major
+        Cells along the ring.
+    n_section
+        Cells on the sides of the rectangle.
+
+    Notes
+    -----
+    By Pappus's theorem the volume is the area of the section times 2 pi major, whatever the twist.
+    """
+    _at_least(3, n_major=n_major)
+    (width, depth), (n, m) = section, n_section
+    across, along = np.arange(n) / n - 0.5, np.arange(m) / m - 0.5
+    half = np.concatenate(
+        [np.stack([width * across, 0 * across - depth / 2], 1), np.stack([0 * along + width / 2, depth * along], 1)]
+    )
+    outline = np.concatenate([half, -half])
+    angle = _turn(n_major)[:, None]
+    cosine, sine = np.cos(half_turns * angle / 2), np.sin(half_turns * angle / 2)
+    x, z = cosine * outline[:, 0] - sine * outline[:, 1], sine * outline[:, 0] + cosine * outline[:, 1]
+    points = np.stack([(major + x) * np.cos(angle), (major + x) * np.sin(angle), z], axis=-1).reshape(-1, 3)
+    faces = patches.grid_faces(n_major + 1, len(outline), wrap_columns=True)
+    # The row behind the last is the first one again, half an outline further for each half turn.
+    number = np.arange((n_major + 1) * len(outline))
+    number[-len(outline) :] = np.roll(np.arange(len(outline)), (half_turns % 2) * (n + m))
+    return Surface(points, number[faces])
+
+
+SAMPLES: dict[str, Callable[[], Surface]] = {
+    "ring": twisted_ring,
+    "part": lambda: cad_part(16),
+    "ellipsoid": ellipsoid,
+    "torus": torus,
+    "cylinder": cylinder,
+    "sphere": lambda: sphere(4),
+    "waves": lambda: open_patch(lambda x, y: 0.15 * np.sin(6 * x + 2 * y) * np.exp(-(x**2) - y**2), 60),
+}
+"""The named samples, made when called."""
+
+
+def sample(name: str = DEFAULT_SAMPLE) -> Surface:
+    """Return a sample by its name in :data:`SAMPLES`; the default is a machine part.
+
+    Raises
+    ------
+    OptionError
+        If there is no sample of that name.
+    """
+    if name not in SAMPLES:
+        raise OptionError(f"there is no sample {name!r}; known are {', '.join(SAMPLES)}")
+    return SAMPLES[name]()
+
+
+def _turn(n: int) -> npt.NDArray[np.float64]:
+    return 2 * np.pi * np.arange(n) / n
+
+
+def _at_least(least: int, **counts: int) -> None:
+    for name, count in counts.items():
+        if count < least:
+            raise OptionError(f"{name} is {count}; expected at least {least}")

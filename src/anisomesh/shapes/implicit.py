@@ -1,0 +1,125 @@
+"""Random smooth shapes with exact curvature: level sets of sums of Gaussian blobs."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import igl
+import numpy as np
+import numpy.typing as npt
+
+from anisomesh._arrays import Points
+from anisomesh.errors import MeshError
+from anisomesh.mesh import topology
+from anisomesh.mesh.surface import Surface
+from anisomesh.metric.curvature import Curvature
+
+_GRID = 80  # cells along the longest side of the box
+_REACH = 1.7  # radii of a blob, within which the level set is
+_NEWTON_STEPS = 8
+_FLAT_GRADIENT = 1e-12
+
+Floats = npt.NDArray[np.float64]
+
+
+@dataclass(frozen=True, eq=False)
+class Blobs:
+    """The function 1 - sum of exp(-(x - c)^t A (x - c)), negative inside.
+
+    Attributes
+    ----------
+    centres
+        Centres c (B, 3).
+    shapes
+        Symmetric positive definite matrices A (B, 3, 3).
+    """
+
+    centres: Floats
+    shapes: Floats
+
+    @classmethod
+    def random(cls, rng: np.random.Generator) -> Blobs:
+        """Return two to seven blobs of random sizes and directions, each near the one before."""
+        count = int(rng.integers(2, 8))
+        turns = np.linalg.qr(rng.normal(size=(count, 3, 3)))[0]
+        radii = 0.35 * np.exp(rng.normal(0.0, 0.45, size=(count, 3)))
+        shapes = np.einsum("bij,bj,bkj->bik", turns, radii**-2.0, turns)
+        steps = rng.normal(size=(count, 3))
+        steps *= 0.45 / np.linalg.norm(steps, axis=1, keepdims=True)
+        return cls(centres=np.cumsum(steps, axis=0), shapes=shapes)
+
+    def value(self, points: Points) -> Floats:
+        """Return the function (n,) at points (n, 3)."""
+        return np.asarray(1.0 - self._terms(points)[0].sum(axis=1))
+
+    def gradient(self, points: Points) -> Floats:
+        """Return its gradient (n, 3)."""
+        weight, pulled = self._terms(points)
+        return np.asarray(2.0 * np.einsum("nb,nbx->nx", weight, pulled))
+
+    def hessian(self, points: Points) -> Floats:
+        """Return its second derivatives (n, 3, 3)."""
+        weight, pulled = self._terms(points)
+        outer = np.einsum("nb,nbx,nby->nxy", weight, pulled, pulled)
+        return np.asarray(2.0 * np.einsum("nb,bxy->nxy", weight, self.shapes) - 4.0 * outer)
+
+    def project(self, points: Points) -> Points:
+        """Return the points (n, 3) after Newton steps along the gradient to the level set."""
+        for _ in range(_NEWTON_STEPS):
+            gradient = self.gradient(points)
+            square = np.maximum((gradient**2).sum(axis=1), _FLAT_GRADIENT)
+            points = points - (self.value(points) / square)[:, None] * gradient
+        return points
+
+    def curvature(self, points: Points) -> Curvature:
+        """Return the exact principal curvatures of the level set through the points (n, 3).
+
+        The shape operator is P H P / |g| with gradient g, second derivatives H, and P the projection along g.
+        """
+        gradient = self.gradient(points)
+        length = np.linalg.norm(gradient, axis=1)
+        normal = gradient / length[:, None]
+        across = np.eye(3) - normal[:, :, None] * normal[:, None, :]
+        operator = across @ self.hessian(points) @ across / length[:, None, None]
+        values, vectors = np.linalg.eigh(operator)
+        along = np.abs(np.einsum("nx,nxk->nk", normal, vectors))
+        tangent = np.argsort(along, axis=1)[:, :2]  # but for the eigenvector along the normal
+        rows = np.arange(len(points))[:, None]
+        pair, directions = values[rows, tangent], vectors.transpose(0, 2, 1)[rows, tangent]
+        order = np.argsort(np.abs(pair), axis=1)
+        return Curvature(
+            values=pair[rows, order], directions=directions[rows, order], trusted=np.ones(len(points), dtype=bool)
+        )
+
+    def mesh(self) -> Surface:
+        """Return the largest component of the level set as a mesh of even cells.
+
+        Raises
+        ------
+        MeshError
+            If the level set is empty or not a manifold at this fineness.
+        """
+        reach = _REACH / np.sqrt(np.linalg.eigvalsh(self.shapes).min(axis=1))[:, None]
+        low, high = (self.centres - reach).min(axis=0), (self.centres + reach).max(axis=0)
+        cell = float((high - low).max()) / _GRID
+        counts = np.ceil((high - low) / cell).astype(int) + 1
+        axes = [low[axis] + cell * np.arange(counts[axis]) for axis in range(3)]
+        z, y, x = (table.ravel() for table in np.meshgrid(axes[2], axes[1], axes[0], indexing="ij"))
+        grid = np.ascontiguousarray(np.stack([x, y, z], axis=1))
+        points, faces, _ = igl.marching_cubes(self.value(grid), grid, *map(int, counts), 0.0)
+        if len(faces) == 0:
+            raise MeshError("the level set is empty")
+        component = topology.connected_components(faces.astype(np.int32), len(points))[1][faces[:, 0]]
+        faces = faces[component == np.argmax(np.bincount(component))]
+        used, faces = np.unique(faces, return_inverse=True)
+        surface = Surface(self.project(points[used]), faces.reshape(-1, 3))
+        outward = np.einsum("fx,fx->f", surface.face_normals, self.gradient(surface.points[surface.faces].mean(axis=1)))
+        return (
+            surface if (outward * surface.face_areas).sum() > 0.0 else Surface(surface.points, surface.faces[:, ::-1])
+        )
+
+    def _terms(self, points: Points) -> tuple[Floats, Floats]:
+        """Return exp(-q) of each blob (n, B), and A (x - c) (n, B, 3)."""
+        away = points[:, None] - self.centres
+        pulled = np.einsum("bxy,nby->nbx", self.shapes, away)
+        return np.exp(-np.einsum("nbx,nbx->nb", away, pulled)), pulled

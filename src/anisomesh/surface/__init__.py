@@ -1,1 +1,0 @@
-"""Triangle meshes: data, connectivity, files, repair, subdivision, samples."""

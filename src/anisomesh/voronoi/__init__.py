@@ -1,0 +1,1 @@
+"""The Voronoi diagram in d dimensions, restricted to an embedded surface, and its cells."""
