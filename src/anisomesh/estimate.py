@@ -14,7 +14,7 @@ from anisomesh.embedding.direct import embed
 from anisomesh.embedding.precomputed import given_embedding
 from anisomesh.features.detect import share_of_flat_edges
 from anisomesh.learn import require_torch, torch_is_there
-from anisomesh.mesh.subdivision import Refined
+from anisomesh.mesh.subdivision import Subdivision
 from anisomesh.mesh.surface import Surface
 from anisomesh.metric.curvature import principal_curvatures
 from anisomesh.metric.line_field import directions_of, lines_in, tensors_of
@@ -68,7 +68,7 @@ def chosen_embedding(options: RemeshOptions) -> str:
 
 
 def estimated(
-    plain: Surface, split: Refined, wanted: MetricName | npt.NDArray[Any], options: RemeshOptions
+    plain: Surface, split: Subdivision, wanted: MetricName | npt.NDArray[Any], options: RemeshOptions
 ) -> Estimate:
     """Return the surface and metric to be embedded.
 

@@ -124,7 +124,7 @@ def test_the_mesh_does_not_leave_the_surface():
 
     assert (result.faces != coarse.faces).any()
     assert middles(result).mean() <= 1.05 * middles(coarse).mean()
-    assert not reference.turned(result.points[result.faces]).any()
+    assert not reference.inverted(result.points[result.faces]).any()
 
 
 @pytest.mark.parametrize("kept", [[], [[0, 2]], [[0, 1], [1, 2], [2, 0]]])

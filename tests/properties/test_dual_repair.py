@@ -218,10 +218,10 @@ def test_a_triangle_nearest_to_another_sheet_is_turned_back():
     coarse = open_patch(lambda x, y: 0.0 * x, n=5)
     mesh = coarse.with_points(coarse.points + [0, 0, 0.002] * np.sin(40 * coarse.points[:, [0]]))
     closest = ClosestPoints(reference)
-    assert closest.turned(mesh.points[mesh.faces]).any()
+    assert closest.inverted(mesh.points[mesh.faces]).any()
     points, faces, left = untangle(mesh.points, mesh.faces, closest)
     assert left == 0
-    assert not closest.turned(points[faces]).any()
+    assert not closest.inverted(points[faces]).any()
     assert_same_topology(Surface(points, faces), mesh)
     assert len(points) < 1.3 * mesh.n_points
 

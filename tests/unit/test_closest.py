@@ -54,12 +54,12 @@ def test_a_triangle_on_two_sheets_that_lie_on_each_other_faces_one_of_them():
     )
     closest = ClosestPoints(touching)
     between = np.array([[[0.1, 0.2, 1.0], [0.7, 0.3, 1.0], [0.4, 0.8, 1.0]]])
-    assert not closest.turned(between).any()
-    assert not closest.turned(between[:, ::-1]).any()
+    assert not closest.inverted(between).any()
+    assert not closest.inverted(between[:, ::-1]).any()
     assert closest.clearly_facing(between).all()
     outside = between + up
-    assert not closest.turned(outside).any()
-    assert closest.turned(outside[:, ::-1]).all()
+    assert not closest.inverted(outside).any()
+    assert closest.inverted(outside[:, ::-1]).all()
 
 
 @pytest.mark.parametrize("seed", range(8))
@@ -72,8 +72,8 @@ def test_no_triangle_is_turned_against_a_fold_or_at_a_right_angle(seed):
     flat = ClosestPoints(Surface(fold, np.array([[0, 1, 2]])))
     upright = np.array([[[0.4, 0.2, 0.1], [0.5, 0.3, 0.1], [0.5, 0.3, 0.3]]]) @ turn
     for case, triangle in ((closest, beyond), (flat, upright)):
-        assert not case.turned(triangle).any()
-        assert not case.turned(triangle[:, ::-1]).any()
+        assert not case.inverted(triangle).any()
+        assert not case.inverted(triangle[:, ::-1]).any()
         assert not case.clearly_facing(triangle).any()
 
 

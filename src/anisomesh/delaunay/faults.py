@@ -18,7 +18,7 @@ from anisomesh.voronoi.diagram import Diagram
 
 def faulty_faces(points: Points, faces: Faces, reference: ClosestPoints) -> npt.NDArray[np.int64]:
     """Return the faces (n,) of a mesh that are flat, turned against the reference, or intersect where it does not."""
-    bad = np.flatnonzero(is_flat(points[faces]) | reference.turned(points[faces]))
+    bad = np.flatnonzero(is_flat(points[faces]) | reference.inverted(points[faces]))
     mesh = Surface(points, faces)
     if len(self_intersections(mesh)) == 0:  # most often, and without a search for those of the reference
         return bad

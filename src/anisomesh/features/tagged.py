@@ -12,7 +12,7 @@ from scipy.spatial import cKDTree
 
 from anisomesh._arrays import EdgeMask
 from anisomesh.errors import MeshFileError, OptionError
-from anisomesh.mesh.subdivision import Refined
+from anisomesh.mesh.subdivision import Subdivision
 from anisomesh.mesh.surface import Surface
 from anisomesh.mesh.topology import edge_keys
 
@@ -77,7 +77,7 @@ def tagged_edges(given: Surface, pairs: npt.ArrayLike, prepared: Surface, tolera
     return found
 
 
-def edges_within(refined: Refined, parent: Surface, tagged: EdgeMask) -> EdgeMask:
+def edges_within(refined: Subdivision, parent: Surface, tagged: EdgeMask) -> EdgeMask:
     """Return which edges (E',) of a subdivided surface lie in tagged edges (E,) of its parent."""
     used = refined.barycentric > 0.0
     some = refined.point_corners[np.arange(len(used)), used.argmax(axis=1)]

@@ -71,7 +71,7 @@ class ClosestPoints:
         normals[at_point] = self._point_normals[point]
         return normals
 
-    def turned(self, corners: Vectors) -> FaceMask:
+    def inverted(self, corners: Vectors) -> FaceMask:
         """Return which triangles (n, 3, 3) face away from the surface where it is closest to their barycentre.
 
         A triangle without area is not turned, nor is one at a right angle to the surface. Where two sheets of the

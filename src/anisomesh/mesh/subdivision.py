@@ -28,7 +28,7 @@ PATTERNS = (
 
 
 @dataclass(frozen=True, kw_only=True)
-class Refined:
+class Subdivision:
     """A subdivided surface and how it lies on its parent.
 
     Parameters
@@ -57,7 +57,7 @@ class Refined:
         return np.asarray(np.einsum("vc,vc...->v...", self.barycentric, values[self.point_corners]))
 
 
-def split_long_edges(surface: Surface, max_length: float, *, max_faces: int) -> Refined:
+def split_long_edges(surface: Surface, max_length: float, *, max_faces: int) -> Subdivision:
     """Split every edge longer than ``max_length`` at its middle until none is left.
 
     Parameters
@@ -99,7 +99,7 @@ def split_long_edges(surface: Surface, max_length: float, *, max_faces: int) -> 
     added = current.faces >= surface.n_points
     point_corners[current.faces[added]] = surface.faces[parent[np.nonzero(added)[0]]]
     barycentric[current.faces[added]] = weights[added]
-    return Refined(
+    return Subdivision(
         surface=current, parent_face=parent, point_corners=point_corners, barycentric=barycentric, complete=complete
     )
 

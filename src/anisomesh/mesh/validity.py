@@ -147,4 +147,4 @@ def flipped_faces(result: Surface, reference: Surface) -> FaceMask:
     ----------
     Baerentzen, Aanaes, "Signed distance computation using the angle weighted pseudonormal", 2005.
     """
-    return ClosestPoints(reference).turned(result.points[result.faces])
+    return ClosestPoints(reference).inverted(result.points[result.faces])

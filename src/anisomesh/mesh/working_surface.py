@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from anisomesh.mesh.subdivision import Refined, split_long_edges
+from anisomesh.mesh.subdivision import Subdivision, split_long_edges
 from anisomesh.mesh.surface import Surface
 
 FINE_POINTS = 5_000  # the working surface has edges no longer than two of an even mesh of so many points
@@ -13,7 +13,7 @@ MAX_GROWTH = 8  # splitting makes at most so many times the faces, or MAX_SPLIT_
 MAX_SPLIT_FACES = 60_000
 
 
-def working_surface(surface: Surface, n_vertices: int) -> Refined:
+def working_surface(surface: Surface, n_vertices: int) -> Subdivision:
     """Return a surface with edges fine enough for so many sites, or as fine as the bound on its faces allows.
 
     Notes

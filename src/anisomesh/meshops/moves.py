@@ -70,7 +70,7 @@ def relax(surface: Surface, turned: FaceMask, reference: ClosestPoints, failed: 
         facet, weights = reference.locate(np.stack(sums, axis=1) / count[:, None])
         corners = reference.surface.points[reference.surface.faces[facet]]
         points[near] = np.einsum("nc,ncx->nx", weights, corners)
-        if reference.turned(points[surface.faces[around]]).sum() < turned.sum():
+        if reference.inverted(points[surface.faces[around]]).sum() < turned.sum():
             return points, surface.faces
     failed.add(key)
     return None
@@ -119,7 +119,7 @@ def _turned_after(points: Points, faces: Faces, point: int, places: Points, refe
     """Return how many of the faces (F, 3) at a point are turned with the point at each of the places (n, 3)."""
     at_point = (faces == point)[:, :, None]
     trials = np.stack([np.where(at_point, place, points[faces]) for place in places])
-    return np.asarray(reference.turned(trials.reshape(-1, 3, 3)).reshape(len(places), -1).sum(axis=1))
+    return np.asarray(reference.inverted(trials.reshape(-1, 3, 3)).reshape(len(places), -1).sum(axis=1))
 
 
 def _averages(surface: Surface, point: int, ring: Ints, reference: ClosestPoints) -> Points:

@@ -171,7 +171,7 @@ def _is_sound(surface: Surface, change: _Change, reference: ClosestPoints) -> bo
     old, new = surface.points[surface.faces[change.gone]], points[change.new]
     if geometry.thickness(new).min() < min(_MIN_THICKNESS, geometry.thickness(old).min()):
         return False
-    if reference.turned(new).sum() > reference.turned(old).sum():
+    if reference.inverted(new).sum() > reference.inverted(old).sum():
         return False
     return bool((~reference.clearly_facing(new)).sum() <= (~reference.clearly_facing(old)).sum())
 

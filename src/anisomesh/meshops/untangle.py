@@ -56,7 +56,7 @@ def untangle(
     wanders = 0
     for _ in range(MAX_ROUNDS):
         surface = Surface(points, faces)
-        turned = reference.turned(points[faces])
+        turned = reference.inverted(points[faces])
         left = int(turned.sum())
         if left < best[2]:
             best = points, faces, left
@@ -79,7 +79,7 @@ def _flip(surface: Surface, turned: FaceMask, reference: ClosestPoints, failed: 
     """Return the mesh after edge flips that leave fewer turned triangles, None if there is none."""
     flips = possible_flips(surface, np.unique(surface.face_edges[turned]))
     corners = surface.points[flips.triangles].reshape(-1, 3, 3)
-    change = reference.turned(corners).reshape(-1, 2).sum(axis=1) - turned[flips.pair].sum(axis=1)
+    change = reference.inverted(corners).reshape(-1, 2).sum(axis=1) - turned[flips.pair].sum(axis=1)
     shape = geometry.thickness(corners).reshape(-1, 2).min(axis=1)
     order = np.lexsort((-shape, change))
     order = order[(change < 0)[order]]
@@ -98,7 +98,7 @@ def _collapse(surface: Surface, turned: FaceMask, reference: ClosestPoints, fail
             continue
         changed = np.where(surface.faces[around] == gone, into, surface.faces[around])
         changed = changed[(changed != np.roll(changed, 1, axis=1)).all(axis=1)]
-        if reference.turned(surface.points[changed]).sum() < turned[around].sum():
+        if reference.inverted(surface.points[changed]).sum() < turned[around].sum():
             faces = np.concatenate([np.delete(surface.faces, around, axis=0), changed]).astype(np.int32)
             return np.delete(surface.points, gone, axis=0), (faces - (faces > gone)).astype(np.int32)
         failed.add(key)
@@ -120,7 +120,7 @@ def _split(surface: Surface, turned: FaceMask, reference: ClosestPoints, failed:
         trials = np.stack(
             [np.concatenate([ring, np.broadcast_to(place, (len(loop), 1, 3))], axis=1) for place in places]
         )
-        count = reference.turned(trials.reshape(-1, 3, 3)).reshape(len(places), -1).sum(axis=1)
+        count = reference.inverted(trials.reshape(-1, 3, 3)).reshape(len(places), -1).sum(axis=1)
         best = int(np.argmin(count))
         if count[best] >= turned[gone].sum():
             failed.add(key)
