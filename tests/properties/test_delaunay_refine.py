@@ -3,7 +3,7 @@
 import naive_rvd as naive
 import numpy as np
 import pytest
-from dual_cases import assert_closed_manifold, mended
+from delaunay_cases import assert_closed_manifold, mended
 
 from anisomesh.cvt.optimise import lloyd
 from anisomesh.delaunay import refine

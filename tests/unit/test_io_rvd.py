@@ -4,7 +4,7 @@ import meshio
 import naive_rvd as naive
 import numpy as np
 import pytest
-from dual_cases import dual_case
+from delaunay_cases import dual_case
 
 from anisomesh.errors import MeshFileError
 from anisomesh.io.rvd import N_COLOURS, save_polygons

@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-from dual_cases import assert_closed_manifold, mended
+from delaunay_cases import assert_closed_manifold, mended
 
 from anisomesh.delaunay.noncontractible_loops import points_on_loops
 from anisomesh.mesh.closest_points import ClosestPoints

@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-from dual_cases import assert_closed_manifold
+from delaunay_cases import assert_closed_manifold
 from hypothesis import given, settings
 from hypothesis import strategies as st
 

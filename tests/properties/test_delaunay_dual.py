@@ -5,7 +5,7 @@ import itertools
 import naive_rvd as naive
 import numpy as np
 import pytest
-from dual_cases import assert_closed_manifold, dual_case
+from delaunay_cases import assert_closed_manifold, dual_case
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
