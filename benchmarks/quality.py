@@ -53,7 +53,7 @@ def faults(row: dict[str, Any]) -> list[str]:
     """Return what is wrong with a result, in words."""
     validity = row["validity"]
     found = [name for name in ("closed", "oriented") if not validity[name]]
-    found += [name for name in ("nonmanifold_edges", "nonmanifold_vertices", "flipped") if validity[name]]
+    found += [name for name in ("nonmanifold_edges", "nonmanifold_vertices", "inverted") if validity[name]]
     if validity["euler"] != validity["euler_input"]:
         found.append(f"euler {validity['euler']} for {validity['euler_input']}")
     if validity["components"] != row["components_input"]:

@@ -26,7 +26,7 @@ from anisomesh.options import EMBEDDINGS
 OUT = Path(__file__).parent / "out" / "robustness.jsonl"
 LIMIT = 600  # seconds
 SAME = ("components", "euler", "boundary_loops")  # as in the input
-COUNTS = ("nonmanifold_edges", "nonmanifold_vertices", "flat", "flipped", "duplicate_faces", "new_intersections")
+COUNTS = ("nonmanifold_edges", "nonmanifold_vertices", "flat", "inverted", "duplicate_faces", "new_intersections")
 
 
 def run(path: Path, ratio: float, embedding: str) -> dict[str, Any]:

@@ -267,7 +267,7 @@ def _warnings(
         yield f"the Euler characteristic is {validity.euler} instead of {validity.euler_input}; ask for more vertices"
     if validity.flat:
         yield f"{validity.flat:,} triangles have no area"
-    if validity.flipped:
-        yield f"{validity.flipped:,} triangles are turned against the input surface"
+    if validity.inverted:
+        yield f"{validity.inverted:,} triangles are turned against the input surface"
     if validity.new_intersections:
         yield f"{validity.new_intersections:,} pairs of triangles intersect where the input does not"

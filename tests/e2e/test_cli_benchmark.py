@@ -63,7 +63,7 @@ def test_smoke_suite_runs_and_ours_are_valid_and_in_the_order_of_the_paper(run_c
         for evaluation in (normal_metric, plain):
             validity = evaluation["validity"]
             assert validity["euler"] == validity["euler_input"]
-            assert not (validity["nonmanifold_edges"] or validity["nonmanifold_vertices"] or validity["flipped"])
+            assert not (validity["nonmanifold_edges"] or validity["nonmanifold_vertices"] or validity["inverted"])
         assert normal_metric["distance"]["rms"] < plain["distance"]["rms"]
         assert normal_metric["shape"]["g_mean"] < plain["shape"]["g_mean"]
 

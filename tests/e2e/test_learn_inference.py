@@ -43,7 +43,7 @@ def test_a_smooth_shape_is_remeshed_as_well_as_directly(egg, embedding):
         result = anisomesh.remesh(egg, n_vertices=400, embedding=name)
         assert result.surface.n_points == 400
         assert result.noise == 0.0
-        assert not result.validity.flipped
+        assert not result.validity.inverted
         measured[name] = evaluate(egg, result.surface, samples=20_000)
     assert measured[embedding].shape.g_mean > measured["direct"].shape.g_mean - 0.04
     assert measured[embedding].distance.rms < 1.15 * measured["direct"].distance.rms

@@ -28,7 +28,7 @@ def test_closed_input_gives_a_valid_mesh_of_the_asked_size(ring, result):
     assert result.surface.n_points == result.vertices_asked == 400
     validity = result.validity
     assert (validity.closed, validity.oriented) == (True, True)
-    assert (validity.nonmanifold_edges, validity.nonmanifold_vertices, validity.flipped) == (0, 0, 0)
+    assert (validity.nonmanifold_edges, validity.nonmanifold_vertices, validity.inverted) == (0, 0, 0)
     assert validity.euler == validity.euler_input == 0
     assert result.warnings == ()
     assert surface_distance(ring, result.surface, samples=2000).hausdorff < 0.05
@@ -132,7 +132,7 @@ def test_corners_of_a_machine_part_are_met():
     edge = result.surface.edge_lengths.mean()
     distance = np.linalg.norm(result.surface.points[:, None] - corners[None], axis=2).min(axis=0)
     assert distance.max() < 0.06 * edge
-    assert result.validity.flipped == 0
+    assert result.validity.inverted == 0
 
 
 def test_progress_names_the_stages_and_counts_iterations(ring):

@@ -104,7 +104,7 @@ def test_a_valid_mesh_comes_out(name):
     assert validity.nonmanifold_edges == validity.nonmanifold_vertices == validity.duplicate_faces == 0
     assert validity.oriented
     assert np.isfinite(result.surface.points).all()
-    if result.surface.n_points != n or validity.flipped or validity.new_intersections:
+    if result.surface.n_points != n or validity.inverted or validity.new_intersections:
         assert result.warnings or abs(result.surface.n_points - n) <= 0.02 * n
 
 

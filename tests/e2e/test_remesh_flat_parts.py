@@ -40,7 +40,7 @@ def test_corners_and_planes_are_exact_and_creases_covered(name, seed):
     assert (from_crease < 1e-6 * size).mean() > 0.99
     assert new.n_points == n
     assert result.validity.euler == 2
-    assert result.validity.flipped == 0
+    assert result.validity.inverted == 0
 
 
 @pytest.mark.parametrize("name", ["gear", "screw", "washer stack"])
@@ -51,5 +51,5 @@ def test_round_creases_of_sparse_parts_are_covered_by_chords(name):
         part, result.surface, crease_angle=40.0, tolerance=0.1 * result.surface.edge_lengths.mean()
     )
     assert kept.crease_covered > 0.99
-    assert result.validity.new_intersections == result.validity.flipped == 0
+    assert result.validity.new_intersections == result.validity.inverted == 0
     assert result.surface.n_points == 300

@@ -131,7 +131,7 @@ def test_more_sites_where_triangles_intersect(monkeypatch):
         validity = check_validity(Surface(result.points, result.faces), folds)
         assert len(result.points) == 120
         assert (validity.euler, validity.nonmanifold_edges) == (1, 0)
-        return validity.flipped + validity.self_intersections
+        return validity.inverted + validity.self_intersections
 
     assert faults() == 0
     monkeypatch.setattr(refine, "_MAX_REPEATS", 0)

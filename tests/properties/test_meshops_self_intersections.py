@@ -44,7 +44,7 @@ def test_points_that_reach_into_another_sheet_come_back(seed):
     assert left == len(self_intersections(Surface(points, faces)))
     assert left == 0 or left < before
     assert_closed_manifold(faces, 4)
-    assert check_validity(Surface(points, faces), reference).flipped <= check_validity(broken, reference).flipped
+    assert check_validity(Surface(points, faces), reference).inverted <= check_validity(broken, reference).inverted
 
 
 def test_a_mesh_without_intersections_is_returned_as_it_is():

@@ -19,7 +19,7 @@ SOUND = {
     "nonmanifold_edges": 0,
     "nonmanifold_vertices": 0,
     "oriented": True,
-    "flipped": 0,
+    "inverted": 0,
 }
 
 
@@ -57,7 +57,7 @@ def test_a_sound_surface_has_no_defect_in_its_description():
         ({"nonmanifold_edges": 1}, "1 non-manifold edge"),
         ({"nonmanifold_vertices": 2}, "2 non-manifold vertices"),
         ({"oriented": False}, "not consistently oriented"),
-        ({"flipped": 4}, "4 flipped triangles"),
+        ({"inverted": 4}, "4 inverted triangles"),
     ],
 )
 def test_every_defect_is_named(change, words):

@@ -32,7 +32,7 @@ def test_a_mesh_against_itself(surface):
     assert evaluation.features.crease_covered == 1.0
     assert evaluation.features.corners_kept == evaluation.features.corners
     assert evaluation.validity.euler == evaluation.validity.euler_input
-    assert evaluation.validity.flipped == 0
+    assert evaluation.validity.inverted == 0
     assert evaluation.validity.self_intersections == evaluation.validity.self_intersections_input == 0
     assert all(np.isfinite(number) for number in numbers(evaluation.as_dict()))
     json.dumps(evaluation.as_dict(), allow_nan=False)
@@ -71,9 +71,9 @@ def test_defects_of_the_result_are_found():
     reference = sphere(3)
     turned = reference.faces.copy()
     turned[5] = turned[5, ::-1]
-    flipped = evaluate(reference, Surface(reference.points, turned), samples=100)
-    assert not flipped.validity.oriented
-    assert flipped.validity.flipped == 1
+    inverted = evaluate(reference, Surface(reference.points, turned), samples=100)
+    assert not inverted.validity.oriented
+    assert inverted.validity.inverted == 1
     opened = evaluate(reference, Surface(reference.points, reference.faces[1:]), samples=100)
     assert (opened.validity.closed, opened.validity.boundary_loops) == (False, 1)
     pushed = reference.points.copy()

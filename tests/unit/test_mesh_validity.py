@@ -1,4 +1,4 @@
-"""Topology of a remesh and its flipped triangles."""
+"""Topology of a remesh and its inverted triangles."""
 
 import json
 
@@ -7,7 +7,7 @@ import pytest
 from creases import wedge
 
 from anisomesh.mesh.surface import Surface
-from anisomesh.mesh.validity import check_validity, flipped_faces
+from anisomesh.mesh.validity import check_validity, inverted_faces
 from anisomesh.shapes.analytic import box, cylinder, ellipsoid, sphere, torus
 
 
@@ -31,7 +31,7 @@ def test_closed_surface_against_itself(shape, euler):
     assert validity.oriented
     assert (validity.euler, validity.euler_input, validity.components) == (euler, euler, 1)
     assert (
-        validity.boundary_loops == validity.nonmanifold_edges == validity.nonmanifold_vertices == validity.flipped == 0
+        validity.boundary_loops == validity.nonmanifold_edges == validity.nonmanifold_vertices == validity.inverted == 0
     )
 
 
@@ -55,7 +55,7 @@ def test_non_manifold_and_badly_oriented_faces_are_counted():
     validity = check_validity(with_faces(ball, faces), ball)
     assert not validity.oriented
     assert validity.closed
-    assert validity.flipped == 1
+    assert validity.inverted == 1
 
 
 def test_values_can_be_written_as_json():
@@ -74,19 +74,19 @@ def test_values_can_be_written_as_json():
     ],
     ids=["sphere", "icosahedron", "thin", "torus", "box"],
 )
-def test_coarse_remesh_has_no_flipped_triangle_and_its_reverse_nothing_else(coarse, fine):
-    assert not flipped_faces(coarse, fine).any()
-    assert flipped_faces(with_faces(coarse, coarse.faces[:, ::-1]), fine).all()
+def test_coarse_remesh_has_no_inverted_triangle_and_its_reverse_nothing_else(coarse, fine):
+    assert not inverted_faces(coarse, fine).any()
+    assert inverted_faces(with_faces(coarse, coarse.faces[:, ::-1]), fine).all()
 
 
 @pytest.mark.parametrize("degrees", [10, 40, 90, 150])
-def test_triangles_of_a_blunt_crest_are_not_flipped(degrees):
+def test_triangles_of_a_blunt_crest_are_not_inverted(degrees):
     """A remesh that rounds a sharp crest has a strip above it: closest to the crest, facing up."""
     roof = wedge(np.radians(degrees))
     assert roof.face_normals[:, 2].min() > 0
     strip = Surface(np.array([[-0.01, 0, 0.01], [0.01, 0, 0.01], [0, 0.1, 0.01]]), np.array([[0, 1, 2]]))
-    assert not flipped_faces(strip, roof).any()
-    assert flipped_faces(with_faces(strip, strip.faces[:, ::-1]), roof).all()
+    assert not inverted_faces(strip, roof).any()
+    assert inverted_faces(with_faces(strip, strip.faces[:, ::-1]), roof).all()
 
 
 @pytest.mark.parametrize("degrees", [10, 90])
@@ -100,15 +100,15 @@ def test_facets_on_either_side_of_a_crest_are_equally_good(degrees):
         points = np.stack([-across, across, [0.0, 1, 0]]) * 0.01 + 0.05 * np.array([0, 0, 1.0])
         steep = Surface(points, np.array([[0, 1, 2]]))
         np.testing.assert_allclose(steep.face_normals[0], normal, atol=1e-12)
-        assert not flipped_faces(steep, roof).any()
+        assert not inverted_faces(steep, roof).any()
 
 
 @pytest.mark.parametrize("size", [1e-9, 1.0, 1e9])
-def test_triangle_without_area_is_flat_and_not_flipped(size):
+def test_triangle_without_area_is_flat_and_not_inverted(size):
     ball = sphere(2)
     line = Surface(size * np.array([[1.0, 0, 0], [1, 0.1, 0], [1, 0.2, 0]]), np.array([[0, 1, 2]]))
     ball = ball.with_points(size * ball.points)
-    assert not flipped_faces(line, ball).any()
+    assert not inverted_faces(line, ball).any()
     validity = check_validity(line, ball)
-    assert (validity.flat, validity.flipped) == (1, 0)
+    assert (validity.flat, validity.inverted) == (1, 0)
     assert check_validity(ball, ball).flat == 0

@@ -71,7 +71,7 @@ COLUMNS = (
 def faults(row: Row) -> list[str]:
     """Return what is not valid about the result of a row, in words."""
     validity = row["evaluation"]["validity"]
-    found = [name for name in ("nonmanifold_edges", "nonmanifold_vertices", "flat", "flipped") if validity.get(name)]
+    found = [name for name in ("nonmanifold_edges", "nonmanifold_vertices", "flat", "inverted") if validity.get(name)]
     if not validity["oriented"]:
         found.append("not oriented")
     if validity["euler"] != validity["euler_input"]:

@@ -96,6 +96,6 @@ def describe_validity(validity: dict[str, Any]) -> str:
         counted(vertices, "non-manifold vertex", "non-manifold vertices") if vertices else "",
         "" if validity["oriented"] else "not consistently oriented",
         counted(validity["flat"], "flat triangle") if validity.get("flat") else "",
-        counted(validity["flipped"], "flipped triangle") if validity.get("flipped") else "",
+        counted(validity["inverted"], "inverted triangle") if validity.get("inverted") else "",
     ]
     return ", ".join(part for part in parts if part)

@@ -42,7 +42,7 @@ class Evaluation:
     boundary
         Distances between the boundary curves, a the reference and b the remesh; None where one has none.
     validity
-        Topology, flipped triangles and self-intersections.
+        Topology, inverted triangles and self-intersections.
     """
 
     vertices: int

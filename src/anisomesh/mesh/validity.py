@@ -42,8 +42,8 @@ class Validity:
         Whether faces that share an edge agree on their side.
     flat
         Number of triangles without area, see :func:`~anisomesh.mesh.geometry.is_flat`.
-    flipped
-        Number of triangles that face away from the input, see :func:`flipped_faces`.
+    inverted
+        Number of triangles that face away from the input, see :func:`inverted_faces`.
     self_intersections, self_intersections_input
         Pairs of triangles that intersect, see :func:`~anisomesh.mesh.intersections.self_intersections`.
     new_intersections
@@ -62,7 +62,7 @@ class Validity:
     nonmanifold_vertices: int
     oriented: bool
     flat: int
-    flipped: int
+    inverted: int
     self_intersections: int
     self_intersections_input: int
     new_intersections: int
@@ -73,7 +73,7 @@ class Validity:
 
 
 def check_validity(result: Surface, reference: Surface) -> Validity:
-    """Return the topology of a remesh, beside that of its input, and count its flat and flipped triangles.
+    """Return the topology of a remesh, beside that of its input, and count its flat and inverted triangles.
 
     Parameters
     ----------
@@ -96,7 +96,7 @@ def check_validity(result: Surface, reference: Surface) -> Validity:
         nonmanifold_vertices=count_nonmanifold_points(result.faces),
         oriented=is_oriented(result.faces),
         flat=int(is_flat(result.points[result.faces]).sum()),
-        flipped=int(flipped_faces(result, reference).sum()),
+        inverted=int(inverted_faces(result, reference).sum()),
         self_intersections=len(self_intersections(result)),
         self_intersections_input=len(pairs_input),
         new_intersections=len(new_intersections(result, _facets_of(reference, pairs_input))),
@@ -129,18 +129,18 @@ def new_intersections(result: Surface, crossing: ClosestPoints | None) -> Pairs:
     return np.asarray(pairs[~near[place.reshape(-1, 2)].all(axis=1)])
 
 
-def flipped_faces(result: Surface, reference: Surface) -> FaceMask:
+def inverted_faces(result: Surface, reference: Surface) -> FaceMask:
     """Return which triangles (F,) face away from the input where they are closest to it.
 
-    A triangle is flipped if its normal has a negative dot product with the normal of the input at the point closest
+    A triangle is inverted if its normal has a negative dot product with the normal of the input at the point closest
     to its barycentre. Inside a facet that is the facet's normal, on an edge the sum of the unit normals of the faces
     there, at a point their sum weighted by the angles at the point. So on a crease or a corner, however sharp, the
-    choice among the facets that are equally close does not matter. A triangle without area is not flipped.
+    choice among the facets that are equally close does not matter. A triangle without area is not inverted.
 
     Notes
     -----
     Where a sheet is thinner than twice the distance between its one side and the triangles that stand for it, a
-    barycentre can be closer to the other side, and counts as flipped: the remesh really passes through it there.
+    barycentre can be closer to the other side, and counts as inverted: the remesh really passes through it there.
     A point counts as on a side of the facet when its barycentric coordinate is below 1e-6.
 
     References

@@ -171,7 +171,7 @@ def evened(surface: Surface, recipe: Recipe) -> Surface:
         require_packages(recipe)
         surface = _tetwild(surface)
     result = remesh(surface, n_vertices=recipe.target, metric="uniform", threads=1, time_limit=_SECONDS)
-    if result.validity.flipped or result.surface.n_points > high:
+    if result.validity.inverted or result.surface.n_points > high:
         raise UnsuitableError(f"cannot be made even: {'; '.join(result.warnings)}")
     return result.surface
 
