@@ -14,7 +14,8 @@ import os
 import numpy as np
 
 import anisomesh
-from anisomesh.learn.data.make import Recipe, items_of_blobs
+from anisomesh.learn.data.make import items_of_blobs
+from anisomesh.learn.data.recipe import Recipe
 from anisomesh.mesh.closest_points import ClosestPoints
 from anisomesh.mesh.distance import surface_distance
 from anisomesh.mesh.noise import with_noise

@@ -17,9 +17,10 @@ from anisomesh.learn import require_torch, torch_is_there
 from anisomesh.mesh.subdivision import Subdivision
 from anisomesh.mesh.surface import Surface
 from anisomesh.metric.curvature import principal_curvatures
-from anisomesh.metric.line_field import directions_of, lines_in, tensors_of
+from anisomesh.metric.line_field import line_field_components, principal_stretch, tensors_of_line_field
+from anisomesh.metric.names import MetricName
 from anisomesh.metric.tangent import tangent_frames, unit_normals
-from anisomesh.metric.tensors import MetricName, compute_metric, curvature_metric
+from anisomesh.metric.tensors import compute_metric, curvature_metric
 from anisomesh.options import RemeshOptions
 
 MEASURED_SHARE = 0.7
@@ -124,6 +125,6 @@ def _blended(surface: Surface, predicted: PointTensors) -> PointTensors:
     curvature = principal_curvatures(surface)
     measured = curvature_metric(surface, curvature)
     frames = tangent_frames(unit_normals(surface))
-    lines, other = (lines_in(frames, *directions_of(tensors)) for tensors in (predicted, measured))
+    lines, other = (line_field_components(*principal_stretch(tensors), frames) for tensors in (predicted, measured))
     share = np.where(curvature.trusted, MEASURED_SHARE, 0.0)[:, None]
-    return tensors_of((1.0 - share) * lines + share * other, frames)
+    return tensors_of_line_field((1.0 - share) * lines + share * other, frames)

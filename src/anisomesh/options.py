@@ -2,19 +2,22 @@
 
 from __future__ import annotations
 
+import math
 import os
 from collections.abc import Callable
 from dataclasses import dataclass
-from typing import Any
-
-import numpy as np
-import numpy.typing as npt
+from typing import TYPE_CHECKING, Any, Literal, get_args
 
 from anisomesh.errors import OptionError
-from anisomesh.metric.tensors import METRIC_NAMES, MetricName
+from anisomesh.metric.names import METRIC_NAMES, MetricName
 
-EMBEDDINGS = ("auto", "direct", "neural", "hybrid")
-DEVICES = ("cpu", "cuda")
+if TYPE_CHECKING:  # the command line imports this module, and has to start at once
+    import numpy.typing as npt
+
+EmbeddingName = Literal["auto", "direct", "neural", "hybrid"]
+DeviceName = Literal["cpu", "cuda"]
+EMBEDDINGS: tuple[EmbeddingName, ...] = get_args(EmbeddingName)
+DEVICES: tuple[DeviceName, ...] = get_args(DeviceName)
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -83,7 +86,7 @@ class RemeshOptions:
     def __post_init__(self) -> None:
         for name in ("sharpness", "final_sharpness"):
             value = getattr(self, name)
-            if value is not None and not (np.isfinite(value) and value >= 1.0):
+            if value is not None and not (math.isfinite(value) and value >= 1.0):
                 raise OptionError(f"{name} = {value}; expected a finite number of at least 1 (1 is the plain CVT)")
         if isinstance(self.metric, str) and self.metric not in METRIC_NAMES:
             raise OptionError(f"metric = {self.metric!r}; expected one of {', '.join(METRIC_NAMES)}, or tensors")

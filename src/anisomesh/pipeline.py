@@ -28,7 +28,7 @@ from anisomesh.mesh.geometry import unit_frame
 from anisomesh.mesh.surface import Surface
 from anisomesh.mesh.validity import Validity, check_validity
 from anisomesh.mesh.working_surface import working_surface
-from anisomesh.metric.tensors import MetricName
+from anisomesh.metric.names import MetricName
 from anisomesh.options import OnStep, RemeshOptions, StepInfo
 from anisomesh.repair.prepare import Prepared, prepare
 from anisomesh.result import RemeshResult

@@ -219,7 +219,7 @@ def test_list_and_errors(run_cli, tmp_path):
 def test_a_suite_trains_the_networks_that_it_compares(tmp_path, run_cli):
     pytest.importorskip("torch")
     from anisomesh.learn.data.build import build, sources_of
-    from anisomesh.learn.data.make import Recipe
+    from anisomesh.learn.data.recipe import Recipe
 
     build(sources_of(None, 6), tmp_path / "items", Recipe(target=200, variants=()), validation=0.4)
     training = {"epochs": 2, "network": {"channels": 8, "scales": 2, "blocks": 1, "heads": 1}}

@@ -15,8 +15,8 @@ from anisomesh.cli.dataset import Variant
 from anisomesh.errors import MeshFileError, OptionError
 from anisomesh.learn.data.build import build, sources_of
 from anisomesh.learn.data.items import load_item
-from anisomesh.learn.data.make import VARIANTS, Recipe
 from anisomesh.learn.data.manifest import MANIFEST, files_of, read_manifest
+from anisomesh.learn.data.recipe import VARIANTS, Recipe
 from anisomesh.shapes.analytic import ellipsoid, sphere, torus
 
 RECIPE = Recipe(target=200, variants=("decimated",))
@@ -72,7 +72,7 @@ def test_a_build_that_was_killed_goes_on(folder, tmp_path):
     out = tmp_path / "out"
     code = (
         "from pathlib import Path; from anisomesh.learn.data.build import *\n"
-        "from anisomesh.learn.data.make import Recipe\n"
+        "from anisomesh.learn.data.recipe import Recipe\n"
         f"if __name__ == '__main__': build(sources_of(Path({str(folder)!r}), 0), Path({str(out)!r}), "
         "Recipe(target=200, variants=('decimated',)), workers=1)"
     )

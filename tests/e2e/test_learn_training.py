@@ -20,8 +20,9 @@ from tensorboard.backend.event_processing.event_accumulator import EventAccumula
 import anisomesh  # noqa: E402
 from anisomesh.errors import OptionError  # noqa: E402
 from anisomesh.learn.data.items import load_item, save_item  # noqa: E402
-from anisomesh.learn.data.make import Recipe, items_of_blobs  # noqa: E402
+from anisomesh.learn.data.make import items_of_blobs  # noqa: E402
 from anisomesh.learn.data.manifest import Files, files_of  # noqa: E402
+from anisomesh.learn.data.recipe import Recipe  # noqa: E402
 from anisomesh.learn.inference.predict import predict  # noqa: E402
 from anisomesh.learn.inference.pretrained import weights_path  # noqa: E402
 from anisomesh.learn.models.checkpoint import WeightsError, load_state, load_weights, save_state  # noqa: E402

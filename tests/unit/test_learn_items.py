@@ -6,7 +6,8 @@ import trimesh
 
 from anisomesh.errors import MeshFileError, OptionError
 from anisomesh.learn.data.items import Item, load_item, save_item
-from anisomesh.learn.data.make import Recipe, UnsuitableError, evened, items_of_blobs, items_of_mesh
+from anisomesh.learn.data.make import UnsuitableError, evened, items_of_blobs, items_of_mesh
+from anisomesh.learn.data.recipe import Recipe
 from anisomesh.mesh.distance import surface_distance
 from anisomesh.mesh.geometry import thickness
 from anisomesh.metric.curvature import principal_curvatures

@@ -10,14 +10,14 @@ from typing import Any
 import numpy as np
 
 from anisomesh.bench.disturb import CLEAN
-from anisomesh.bench.runs import Row, chosen
+from anisomesh.bench.runs import RunRow, chosen
 from anisomesh.bench.suite import Suite
 
 _PANEL = (3.6, 3.4)  # inches
 _MARKERS = "osD^v<>Ph*Xd"
 
 
-def trade_off(suite: Suite, rows: Sequence[Row]) -> str:
+def trade_off(suite: Suite, rows: Sequence[RunRow]) -> str:
     """Return a chart as SVG: one panel an input and ratio, one mark a method, empty if there is nothing to show.
 
     The geometric mean over meshes and seeds of the root mean square distance, against the mean quality G. Distances
@@ -56,7 +56,7 @@ def trade_off(suite: Suite, rows: Sequence[Row]) -> str:
     return text.getvalue()
 
 
-def _points(suite: Suite, rows: Sequence[Row], given: str, ratio: float) -> dict[str, tuple[float, float]]:
+def _points(suite: Suite, rows: Sequence[RunRow], given: str, ratio: float) -> dict[str, tuple[float, float]]:
     """Return mean quality and mean distance of each method that has results for an input at a ratio."""
     found = {}
     for method in suite.methods:

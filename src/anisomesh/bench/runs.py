@@ -24,7 +24,7 @@ from anisomesh.isolation import isolated
 from anisomesh.mesh.surface import Surface
 from anisomesh.repair.prepare import prepare
 
-Row = dict[str, Any]
+RunRow = dict[str, Any]
 KEYS = ("mesh", "input", "ratio", "method", "seed")
 
 
@@ -32,7 +32,7 @@ KEYS = ("mesh", "input", "ratio", "method", "seed")
 class Progress:
     """What has just been done: its row, which of how many it was, and the seconds left if the rest is alike."""
 
-    row: Row
+    row: RunRow
     number: int
     total: int
     seconds_left: float
@@ -46,7 +46,7 @@ def run_suite(
     items: Path | None = None,
     on_row: Callable[[Progress], None] = lambda progress: None,
     on_epoch: Callable[[str], None] = lambda text: None,
-) -> list[Row]:
+) -> list[RunRow]:
     """Run what is not yet in a file of rows and return all rows of the suite.
 
     Parameters
@@ -100,7 +100,7 @@ def run_suite(
     return [known[job.key] for job in _jobs(suite, inputs)]
 
 
-def read_rows(path: Path) -> list[Row]:
+def read_rows(path: Path) -> list[RunRow]:
     """Return the rows of a file, none if it is not there.
 
     Raises
@@ -119,7 +119,7 @@ def read_rows(path: Path) -> list[Row]:
     return rows
 
 
-def chosen(rows: Sequence[Row], given: str, ratio: float, method: str) -> list[Row]:
+def chosen(rows: Sequence[RunRow], given: str, ratio: float, method: str) -> list[RunRow]:
     """Return the rows of a method for an input at a ratio."""
     return [row for row in rows if (row.get("input", CLEAN), row["ratio"], row["method"]) == (given, ratio, method)]
 
@@ -133,7 +133,7 @@ class _Job:
     seed: int
 
     @property
-    def start(self) -> Row:
+    def start(self) -> RunRow:
         """The part of the row that is known beforehand."""
         names = {"mesh": self.mesh.name, "input": self.given, "ratio": self.ratio, "method": self.method.name}
         training = {} if self.method.training is None else {"training": self.method.training}
@@ -169,15 +169,15 @@ def _jobs(suite: Suite, meshes: list[Input]) -> Iterator[_Job]:
         yield _Job(mesh, given, ratio, method, seed)
 
 
-def _key(row: Row) -> tuple[Any, ...]:
+def _key(row: RunRow) -> tuple[Any, ...]:
     return tuple(row.get(key, CLEAN) if key == "input" else row[key] for key in KEYS)  # older rows have no input
 
 
-def _is_done(row: Row | None, job: _Job) -> bool:
+def _is_done(row: RunRow | None, job: _Job) -> bool:
     return row is not None and row["options"] == job.start["options"]
 
 
-def _run(job: _Job, loaded: _Loaded, suite: Suite, weights: Path | None) -> Row:
+def _run(job: _Job, loaded: _Loaded, suite: Suite, weights: Path | None) -> RunRow:
     remesher = METHODS[job.method.method]
     if suite.closed and (loaded.clean.edge_face_count == 1).any():
         return {**job.start, "status": "skipped", "error": "the mesh is open"}

@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 
 from anisomesh.bench.disturb import CLEAN
-from anisomesh.bench.runs import Row, chosen
+from anisomesh.bench.runs import RunRow, chosen
 from anisomesh.bench.suite import Suite
 
 
@@ -20,13 +20,13 @@ class Column:
     """A figure of a row: its heading, how to find it, how many digits to show, and how to average it."""
 
     heading: str
-    value: Callable[[Row], float | None]
+    value: Callable[[RunRow], float | None]
     digits: int
     geometric: bool = False
 
 
-def _figure(*path: str, factor: float = 1.0) -> Callable[[Row], float | None]:
-    def value(row: Row) -> float | None:
+def _figure(*path: str, factor: float = 1.0) -> Callable[[RunRow], float | None]:
+    def value(row: RunRow) -> float | None:
         found: Any = row["evaluation"]
         for key in path:
             found = found[key]
@@ -35,10 +35,10 @@ def _figure(*path: str, factor: float = 1.0) -> Callable[[Row], float | None]:
     return value
 
 
-def _boundary(which: str) -> Callable[[Row], float | None]:
+def _boundary(which: str) -> Callable[[RunRow], float | None]:
     """Return the larger of the two distances between boundaries, in mean edge lengths of the result."""
 
-    def value(row: Row) -> float | None:
+    def value(row: RunRow) -> float | None:
         found = row["evaluation"].get("boundary")
         if found is None:
             return None
@@ -68,7 +68,7 @@ COLUMNS = (
 )
 
 
-def faults(row: Row) -> list[str]:
+def faults(row: RunRow) -> list[str]:
     """Return what is not valid about the result of a row, in words."""
     validity = row["evaluation"]["validity"]
     found = [name for name in ("nonmanifold_edges", "nonmanifold_vertices", "flat", "inverted") if validity.get(name)]
@@ -81,7 +81,7 @@ def faults(row: Row) -> list[str]:
     return found
 
 
-def mean_table(suite: Suite, rows: Sequence[Row]) -> tuple[list[str], list[list[str]]]:
+def mean_table(suite: Suite, rows: Sequence[RunRow]) -> tuple[list[str], list[list[str]]]:
     """Return heading and lines of the means over meshes and seeds, by input, ratio and method.
 
     Distances are averaged geometrically, everything else arithmetically; figures that are not defined for a mesh (ECD
@@ -106,7 +106,7 @@ def _vertices(given: str, ratio: float) -> str:
     return f"{ratio:.0%}" if given == CLEAN else f"{ratio:.0%} of {given}"
 
 
-def run_table(rows: Sequence[Row]) -> tuple[list[str], list[list[str]]]:
+def run_table(rows: Sequence[RunRow]) -> tuple[list[str], list[list[str]]]:
     """Return heading and lines of the single runs."""
     heading = ["mesh", "vertices", "method", "seed", *(column.heading for column in COLUMNS), "remarks"]
     lines = []
@@ -120,7 +120,7 @@ def run_table(rows: Sequence[Row]) -> tuple[list[str], list[list[str]]]:
     return heading, lines
 
 
-def time_table(rows: Sequence[Row]) -> tuple[list[str], list[list[str]]]:
+def time_table(rows: Sequence[RunRow]) -> tuple[list[str], list[list[str]]]:
     """Return heading and lines of the seconds of each stage against the number of vertices wanted.
 
     For methods that tell the seconds of their stages; below them the exponent of a power law fitted to the runs, where
@@ -142,12 +142,12 @@ def time_table(rows: Sequence[Row]) -> tuple[list[str], list[list[str]]]:
     return ["method", "mesh", "ratio", "vertices wanted", *stages], lines
 
 
-def _sections(suite: Suite, rows: Sequence[Row]) -> list[tuple[str, tuple[list[str], list[list[str]]]]]:
+def _sections(suite: Suite, rows: Sequence[RunRow]) -> list[tuple[str, tuple[list[str], list[list[str]]]]]:
     sections = [("Means", mean_table(suite, rows)), ("Runs", run_table(rows)), ("Seconds", time_table(rows))]
     return [section for section in sections if section[1][1]]
 
 
-def markdown(suite: Suite, rows: Sequence[Row], chart: str = "") -> str:
+def markdown(suite: Suite, rows: Sequence[RunRow], chart: str = "") -> str:
     """Return the report of a suite as Markdown; ``chart`` is the name of a picture to show."""
     parts = [f"# {suite.name}", suite.description.strip(), _remarks(rows)]
     parts.append(f"![Distance against quality]({chart})" if chart else "")
@@ -158,7 +158,7 @@ def markdown(suite: Suite, rows: Sequence[Row], chart: str = "") -> str:
     return "\n\n".join(part for part in parts if part) + "\n"
 
 
-def web_page(suite: Suite, rows: Sequence[Row], chart: str = "") -> str:
+def web_page(suite: Suite, rows: Sequence[RunRow], chart: str = "") -> str:
     """Return the report of a suite as a page of HTML that needs nothing else; ``chart`` is SVG to show in it."""
     parts = [f"<h1>{html.escape(suite.name)}</h1>", f"<p>{html.escape(suite.description.strip())}</p>"]
     parts.append(f"<p>{html.escape(_remarks(rows))}</p>")
@@ -180,14 +180,14 @@ _STYLE = (
 )
 
 
-def _remarks(rows: Sequence[Row]) -> str:
+def _remarks(rows: Sequence[RunRow]) -> str:
     absent = sorted({f"{row['method']} ({row['error']})" for row in rows if row["status"] == "absent"})
     skipped = len({row["mesh"] for row in rows if row["status"] == "skipped"})
     parts = [f"Left out: {', '.join(absent)}." if absent else "", f"Open meshes skipped: {skipped}." if skipped else ""]
     return " ".join(part for part in parts if part)
 
 
-def _mean(column: Column, rows: Sequence[Row]) -> str:
+def _mean(column: Column, rows: Sequence[RunRow]) -> str:
     values = [value for row in rows if (value := column.value(row)) is not None]
     if not values:
         return "-"

@@ -12,7 +12,7 @@ import typer
 from anisomesh.cli.progress import announce_compilation, progress
 
 if TYPE_CHECKING:
-    from anisomesh.bench.runs import Progress, Row
+    from anisomesh.bench.runs import Progress, RunRow
     from anisomesh.bench.suite import Suite
 
 
@@ -73,7 +73,7 @@ def command(
     typer.echo(f"{len(rows):,} runs; wrote " + ", ".join(f"{stem}{suffix}" for suffix in (".jsonl", *texts)))
 
 
-def _chart(suite: Suite, rows: list[Row]) -> str:
+def _chart(suite: Suite, rows: list[RunRow]) -> str:
     """Return the chart of the report, nothing where it cannot be drawn."""
     from anisomesh.bench.charts import trade_off
 

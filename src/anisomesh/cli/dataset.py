@@ -14,7 +14,7 @@ from anisomesh.cli.progress import announce_compilation, progress
 from anisomesh.cli.report import counted, table
 
 if TYPE_CHECKING:
-    from anisomesh.learn.data.manifest import Row
+    from anisomesh.learn.data.manifest import ManifestRow
 
 
 class Variant(StrEnum):
@@ -56,7 +56,7 @@ def build_command(
 ) -> None:
     """Make training items of the meshes of SRC in OUT; a build that was stopped goes on where it was."""
     from anisomesh.learn.data.build import build, sources_of
-    from anisomesh.learn.data.make import Recipe
+    from anisomesh.learn.data.recipe import Recipe
 
     if no_variants and variant:
         raise typer.BadParameter("give either --variant or --no-variants")
@@ -85,7 +85,7 @@ def info_command(folder: Annotated[Path, typer.Argument(metavar="DATASET", help=
             typer.echo(f"  {row['status']:<8} {row['name']}: {row['reason']}")
 
 
-def _summary(rows: list[Row]) -> str:
+def _summary(rows: list[ManifestRow]) -> str:
     status = Counter(row["status"] for row in rows)
     kept = [row for row in rows if row["status"] == "kept"]
     lines = [
@@ -100,10 +100,10 @@ def _summary(rows: list[Row]) -> str:
     return table(lines)
 
 
-def _print(row: Row, number: int, total: int) -> None:
+def _print(row: ManifestRow, number: int, total: int) -> None:
     said = ", ".join(item["kind"] for item in row["items"]) if row["status"] == "kept" else row["reason"]
     print(f"[{number}/{total}] {row['name'][:48]:<48} {row['status']:<8} {said}", file=sys.stderr, flush=True)
 
 
-def _ignore(row: Row, number: int, total: int) -> None:
+def _ignore(row: ManifestRow, number: int, total: int) -> None:
     """Say nothing."""

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Any, Literal
+from typing import Any
 
 import numpy as np
 import numpy.typing as npt
@@ -12,10 +12,9 @@ from anisomesh._arrays import PointTensors
 from anisomesh.errors import MetricError, OptionError
 from anisomesh.mesh.surface import Surface
 from anisomesh.metric.curvature import Curvature, principal_curvatures
+from anisomesh.metric.names import METRIC_NAMES, MetricName
 from anisomesh.metric.tangent import line_field, line_tensors, one_ring_average, tangent_frames, unit_normals
 
-MetricName = Literal["curvature", "approximation", "uniform"]
-METRIC_NAMES: tuple[MetricName, ...] = ("curvature", "approximation", "uniform")
 DEFAULT_LIMITS = (1.0, 400.0)
 DEFAULT_SMOOTHING = 3
 

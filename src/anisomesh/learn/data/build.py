@@ -18,8 +18,9 @@ from anisomesh.io.atomic import append_line, atomic_path, drop_cut_line
 from anisomesh.io.meshes import FORMATS, load
 from anisomesh.isolation import isolated
 from anisomesh.learn.data.items import save_item
-from anisomesh.learn.data.make import Made, Recipe, UnsuitableError, items_of_blobs, items_of_mesh, require_packages
-from anisomesh.learn.data.manifest import MANIFEST, Row, read_manifest
+from anisomesh.learn.data.make import Made, UnsuitableError, items_of_blobs, items_of_mesh, require_packages
+from anisomesh.learn.data.manifest import MANIFEST, ManifestRow, read_manifest
+from anisomesh.learn.data.recipe import Recipe
 from anisomesh.shapes.implicit import Blobs
 from anisomesh.shapes.lofts import random_part
 
@@ -104,8 +105,8 @@ def build(
     *,
     validation: float = 0.12,
     workers: int = 2,
-    on_row: Callable[[Row, int, int], None] = lambda row, number, total: None,
-) -> list[Row]:
+    on_row: Callable[[ManifestRow, int, int], None] = lambda row, number, total: None,
+) -> list[ManifestRow]:
     """Make the items that are not there yet and return the rows of all sources, in their order.
 
     Parameters
@@ -162,11 +163,11 @@ def build(
     return [known[name] for name in starts]
 
 
-def _line(row: Row) -> str:
+def _line(row: ManifestRow) -> str:
     return json.dumps(row, allow_nan=False) + "\n"
 
 
-def _start(source: Source, recipe: Recipe, validation: float) -> Row:
+def _start(source: Source, recipe: Recipe, validation: float) -> ManifestRow:
     return {
         "name": source.name,
         "family": source.family,
@@ -175,15 +176,15 @@ def _start(source: Source, recipe: Recipe, validation: float) -> Row:
     }
 
 
-def _is_done(row: Row | None, start: Row, out: Path) -> bool:
+def _is_done(row: ManifestRow | None, start: ManifestRow, out: Path) -> bool:
     if row is None or row["fingerprint"] != start["fingerprint"]:
         return False
     return all((out / item["file"]).is_file() for item in row.get("items", []))
 
 
-def _in_parallel(jobs: list[Source], out: Path, recipe: Recipe, workers: int) -> Iterator[tuple[Source, Row]]:
+def _in_parallel(jobs: list[Source], out: Path, recipe: Recipe, workers: int) -> Iterator[tuple[Source, ManifestRow]]:
     """Yield sources and what became of them as they end, never more than twice as many begun as there are workers."""
-    waiting: dict[Future[Row], Source] = {}
+    waiting: dict[Future[ManifestRow], Source] = {}
     left = iter(jobs)
     with ThreadPoolExecutor(workers) as pool:
         try:
@@ -200,7 +201,7 @@ def _in_parallel(jobs: list[Source], out: Path, recipe: Recipe, workers: int) ->
             pool.shutdown(cancel_futures=True)
 
 
-def _guarded(source: Source, out: Path, recipe: Recipe) -> Row:
+def _guarded(source: Source, out: Path, recipe: Recipe) -> ManifestRow:
     """Make the items of a source in a new process; whatever goes wrong is its row."""
     try:
         return isolated(make)(source, out, recipe)
@@ -211,7 +212,7 @@ def _guarded(source: Source, out: Path, recipe: Recipe) -> Row:
         return {"status": "failed", "reason": str(error) if known else f"{type(error).__name__}: {error}"}
 
 
-def make(source: Source, out: Path, recipe: Recipe) -> Row:
+def make(source: Source, out: Path, recipe: Recipe) -> ManifestRow:
     """Make and write the items of a source; return the part of its row that says so."""
     rng = np.random.default_rng(source.seed)
     made: list[Made]

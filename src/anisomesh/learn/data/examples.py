@@ -12,7 +12,7 @@ from anisomesh.learn.data.items import Item
 from anisomesh.learn.models.hierarchy import Pyramid, pyramid
 from anisomesh.mesh.geometry import sums_at_points
 from anisomesh.mesh.noise import Noise, with_noise
-from anisomesh.metric.line_field import directions_of, lines_in
+from anisomesh.metric.line_field import line_field_components, principal_stretch
 
 _UNTRUSTED = 0.1  # weight of points whose curvature is not known well
 
@@ -73,7 +73,7 @@ def example_of(
     """
     clean = item.surface
     noisy = clean if rng is None else with_noise(clean, noise, rng, kind)
-    directions, logarithms = directions_of(item.tensors)
+    directions, logarithms = principal_stretch(item.tensors)
     scales = pyramid(noisy, n_scales)
     area = sums_at_points(clean.face_areas, clean.faces, clean.n_points)
     normals = clean.face_normals
@@ -83,7 +83,7 @@ def example_of(
     unit = float(clean.edge_lengths.mean())
     return Example(
         pyramid=scales,
-        lines=torch.from_numpy(lines_in(scales.frames, directions, logarithms)),
+        lines=torch.from_numpy(line_field_components(directions, logarithms, scales.frames)),
         offsets=torch.from_numpy(((clean.points - noisy.points) / unit).astype(np.float32)),
         quadrics=torch.from_numpy((quadrics / np.maximum(area, 1e-30)[:, None, None]).astype(np.float32)),
         edges=torch.from_numpy(clean.edges.astype(np.int64)),

@@ -7,7 +7,7 @@ from collections.abc import Callable
 from contextlib import chdir
 from dataclasses import dataclass, field
 from tempfile import TemporaryDirectory
-from typing import Any, Literal
+from typing import Any
 
 import numpy as np
 
@@ -15,6 +15,7 @@ from anisomesh._arrays import PointMask, Points, PointTensors
 from anisomesh.embedding.direct import embed
 from anisomesh.errors import AnisomeshError, OptionError
 from anisomesh.learn.data.items import Item
+from anisomesh.learn.data.recipe import Recipe
 from anisomesh.learn.data.retriangulate import with_random_triangles
 from anisomesh.mesh.closest_points import ClosestPoints
 from anisomesh.mesh.geometry import Frame, thickness, unit_frame
@@ -28,7 +29,6 @@ from anisomesh.pipeline import remesh
 from anisomesh.repair.prepare import prepare
 from anisomesh.shapes.implicit import Blobs
 
-VARIANTS = ("given", "decimated", "stretched")
 _REGULAR = 0.4330127  # thickness of an equilateral triangle
 _COUNTS = (0.6, 1.6)  # of the wanted number of points that a mesh may have without being made anew
 _EVEN = 0.7  # mean thickness, as a share of the regular one, from which on a mesh is even
@@ -39,46 +39,6 @@ _SITES = (0.2, 1.0)  # of its points: the numbers of sites that its working surf
 _SECONDS = 120.0  # for a remesh
 
 MetricOn = Callable[[Surface], tuple[PointTensors, PointMask]]
-
-
-@dataclass(frozen=True, kw_only=True)
-class Recipe:
-    """How items are made.
-
-    Attributes
-    ----------
-    target
-        Points that the even mesh of a shape has, about.
-    variants
-        Other meshes of every shape: ``"given"`` (the one that it came with, as a remesh works on it, if its triangles
-        are good enough), ``"decimated"`` (quadric collapses: irregular triangles) and ``"stretched"`` (triangles
-        stretched in a random direction that has nothing to do with the curvature).
-    evening
-        How meshes with other numbers of points, or with bad triangles, are made even: ``"cvt"``, our own remesh with a
-        uniform metric, or ``"tetwild"``, the boundary of pytetwild's tetrahedra, as in the paper, and then the same.
-    max_residual
-        Largest relative residual of the direct embedding.
-    min_stretch
-        Least mean stretch; shapes below it are flat or round everywhere.
-    iterations
-        Steps of the direct embedding.
-    """
-
-    target: int = 5_000
-    variants: tuple[str, ...] = VARIANTS
-    evening: Literal["cvt", "tetwild"] = "cvt"
-    max_residual: float = 0.4
-    min_stretch: float = 1.05
-    iterations: int = 30
-
-    def __post_init__(self) -> None:
-        if self.target < 100:
-            raise OptionError(f"target = {self.target}; expected at least 100 points")
-        for name in self.variants:
-            if name not in VARIANTS:
-                raise OptionError(f"variant {name!r} is unknown; expected some of {', '.join(VARIANTS)}")
-        if self.evening not in ("cvt", "tetwild"):
-            raise OptionError(f"evening = {self.evening!r}; expected 'cvt' or 'tetwild'")
 
 
 def require_packages(recipe: Recipe) -> None:

@@ -11,7 +11,7 @@ from anisomesh.errors import MeshFileError
 
 MANIFEST = "manifest.jsonl"
 
-Row = dict[str, Any]
+ManifestRow = dict[str, Any]
 
 
 @dataclass(frozen=True)
@@ -22,7 +22,7 @@ class Files:
     validation: list[Path]
 
 
-def read_manifest(folder: Path) -> list[Row]:
+def read_manifest(folder: Path) -> list[ManifestRow]:
     """Return the rows of a data set, the last one of each source; none if there is no list.
 
     Raises
@@ -32,7 +32,7 @@ def read_manifest(folder: Path) -> list[Row]:
     """
     path = folder / MANIFEST
     lines = path.read_text(encoding="utf-8").split("\n") if path.exists() else []
-    rows: dict[str, Row] = {}
+    rows: dict[str, ManifestRow] = {}
     for number, line in enumerate(lines, 1):
         if not line:
             continue

@@ -30,7 +30,7 @@ VALIDATION_NOISE = (0.0, 0.3)  # mean edge lengths
 
 _PLACES = ("data", "out", "start")  # of one machine
 
-Row = dict[str, Any]
+EpochRow = dict[str, Any]
 
 
 class DivergedError(AnisomeshError):
@@ -86,7 +86,7 @@ class Run:
         self._events = Events(out / EVENTS)
         self._steps = max(1, math.ceil(len(files.training) / options.batch))
 
-    def epoch(self, interrupted: Interruption) -> Row:
+    def epoch(self, interrupted: Interruption) -> EpochRow:
         """Go to the end of the epoch, save what it takes to go on, and return its row."""
         options, start = self.options, time.monotonic()
         saved = start
@@ -101,7 +101,7 @@ class Run:
                 saved = time.monotonic()
             if came:
                 raise KeyboardInterrupt
-        row: Row = {
+        row: EpochRow = {
             "epoch": self.at.epoch + 1,
             "loss": self.at.total / self._steps,
             "rate": self._rate(self.at.epoch * self._steps + self._steps),
@@ -113,7 +113,7 @@ class Run:
         self.group.wait()
         return row
 
-    def _conclude(self, row: Row, start: float, interrupted: Interruption) -> None:
+    def _conclude(self, row: EpochRow, start: float, interrupted: Interruption) -> None:
         """Validate, and write weights, measurements and checkpoint at the end of an epoch."""
         row |= {**self.validate(interrupted), "seconds": round(time.monotonic() - start, 1)}
         score = sum(value for name, value in row.items() if name.startswith("validation"))
@@ -128,7 +128,7 @@ class Run:
         self.save()
         self._events.add(row)
 
-    def validate(self, interrupted: Interruption) -> Row:
+    def validate(self, interrupted: Interruption) -> EpochRow:
         """Return the mean losses on the validation items at each noise, unless a signal comes meanwhile.
 
         Of each noise the sum, over that of predicting nothing, and then every loss as it is.
@@ -152,7 +152,7 @@ class Run:
         self.network.train()
         return found
 
-    def rows(self) -> list[Row]:
+    def rows(self) -> list[EpochRow]:
         """Return the rows of the epochs done."""
         path = self.out / METRICS
         lines = path.read_text(encoding="utf-8").splitlines() if path.exists() else []

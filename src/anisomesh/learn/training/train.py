@@ -15,13 +15,17 @@ from anisomesh.learn.models.checkpoint import WeightsError, load_weights
 from anisomesh.learn.models.device import deterministic, device_of
 from anisomesh.learn.training.config import TrainingOptions
 from anisomesh.learn.training.processes import workers
-from anisomesh.learn.training.run import CHECKPOINT, Interruption, Row, Run
+from anisomesh.learn.training.run import CHECKPOINT, EpochRow, Interruption, Run
 from anisomesh.learn.training.tasks import Task, task_of
 
 
 def train(
-    options: TrainingOptions, files: Files, *, resume: bool = False, on_row: Callable[[Row], None] = lambda row: None
-) -> list[Row]:
+    options: TrainingOptions,
+    files: Files,
+    *,
+    resume: bool = False,
+    on_row: Callable[[EpochRow], None] = lambda row: None,
+) -> list[EpochRow]:
     """Train a network and return what was measured after each epoch.
 
     Parameters

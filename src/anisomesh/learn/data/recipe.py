@@ -1,0 +1,53 @@
+"""The recipe of a data set, in a module that imports no numerics, for the command line."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Literal, get_args
+
+from anisomesh.errors import OptionError
+
+VariantName = Literal["given", "decimated", "stretched"]
+EveningName = Literal["cvt", "tetwild"]
+VARIANTS: tuple[VariantName, ...] = get_args(VariantName)
+EVENINGS: tuple[EveningName, ...] = get_args(EveningName)
+
+
+@dataclass(frozen=True, kw_only=True)
+class Recipe:
+    """How items are made.
+
+    Attributes
+    ----------
+    target
+        Points that the even mesh of a shape has, about.
+    variants
+        Other meshes of every shape: ``"given"`` (the one that it came with, as a remesh works on it, if its triangles
+        are good enough), ``"decimated"`` (quadric collapses: irregular triangles) and ``"stretched"`` (triangles
+        stretched in a random direction that has nothing to do with the curvature).
+    evening
+        How meshes with other numbers of points, or with bad triangles, are made even: ``"cvt"``, our own remesh with a
+        uniform metric, or ``"tetwild"``, the boundary of pytetwild's tetrahedra, as in the paper, and then the same.
+    max_residual
+        Largest relative residual of the direct embedding.
+    min_stretch
+        Least mean stretch; shapes below it are flat or round everywhere.
+    iterations
+        Steps of the direct embedding.
+    """
+
+    target: int = 5_000
+    variants: tuple[str, ...] = VARIANTS
+    evening: EveningName = "cvt"
+    max_residual: float = 0.4
+    min_stretch: float = 1.05
+    iterations: int = 30
+
+    def __post_init__(self) -> None:
+        if self.target < 100:
+            raise OptionError(f"target = {self.target}; expected at least 100 points")
+        for name in self.variants:
+            if name not in VARIANTS:
+                raise OptionError(f"variant {name!r} is unknown; expected some of {', '.join(VARIANTS)}")
+        if self.evening not in EVENINGS:
+            raise OptionError(f"evening = {self.evening!r}; expected one of {', '.join(EVENINGS)}")
