@@ -1,4 +1,4 @@
-"""Closest points of a surface, and which way it faces there."""
+"""Closest points of a surface, its normals there, and which triangles face away from it."""
 
 from __future__ import annotations
 
@@ -14,19 +14,20 @@ from anisomesh.mesh.geometry import corner_angles, unit
 from anisomesh.mesh.intersections import self_intersections
 from anisomesh.mesh.surface import Surface
 
-_ON_SIDE = 1e-6
-_BLOCK = 16_384  # queries at a time, so that the memory in between is bounded
-_MARGIN = 0.01  # of the square root of twice the area of a triangle
-_CLEAR = 1e-3  # least cosine between normals that agree clearly
-_ROUNDING = 1e-9  # of cosines, and of sums of unit normals
-_SAME_SHEET = 1e-7  # of the diagonal: sheets so near to each other lie on each other
+_ON_SIDE_WEIGHT = 1e-6  # barycentric coordinate below which a point lies on a side; heuristic, far above rounding
+_QUERIES_PER_BLOCK = 16_384  # bounds the temporary arrays of `locate` to a few megabytes
+_NORMAL_OFFSET = 0.01  # offset of the second and third query of `clearly_facing` over sqrt(2 area); heuristic
+_MIN_FACING_COSINE = 1e-3  # cosine above which two normals agree clearly; heuristic
+_NORMAL_ROUNDING = 1e-9  # generous bound on the rounding of cosines and of sums of unit normals
+_COINCIDENT_DISTANCE = 1e-7  # of the bounding-box diagonal: facets no farther apart coincide; heuristic
+_FLAT_SQUARED_RATIO = 1e-20  # (2 area / longest side^2)^2 up to which a triangle is treated as a segment; heuristic
 
-Vectors = npt.NDArray[np.float64]
-Rows = npt.NDArray[np.int64]
+Vectors = npt.NDArray[np.float64]  # (n, 3)
+Facets = npt.NDArray[np.int64]  # (n,), face indices
 
 
 class ClosestPoints:
-    """A search tree over the facets of a surface, built once for many queries."""
+    """Closest-point queries on a surface by an AABB tree (libigl), built once; lengths in model units."""
 
     def __init__(self, surface: Surface) -> None:
         self.surface = surface
@@ -35,23 +36,23 @@ class ClosestPoints:
         self._tree.init(surface.points, self._faces)
 
     def squared_distances(self, queries: Vectors) -> npt.NDArray[np.float64]:
-        """Return the squared distance (n,) of each point (n, 3) to the surface."""
+        """Return the squared distance (n,) of each query (n, 3) to the surface."""
         return np.asarray(self._query(queries)[0])
 
-    def locate(self, queries: Vectors) -> tuple[Rows, Vectors]:
-        """Return facet (n,) and barycentric coordinates (n, 3) of the closest point to each point (n, 3)."""
+    def locate(self, queries: Vectors) -> tuple[Facets, Vectors]:
+        """Return facet (n,) and barycentric coordinates (n, 3) of the closest point to each query (n, 3)."""
         facet, weights = np.empty(len(queries), dtype=np.int64), np.empty((len(queries), 3))
-        for first in range(0, len(queries), _BLOCK):
-            block = slice(first, first + _BLOCK)
+        for first in range(0, len(queries), _QUERIES_PER_BLOCK):
+            block = slice(first, first + _QUERIES_PER_BLOCK)
             _, facet[block], closest = self._query(queries[block])
             weights[block] = barycentric(self.surface.points[self.surface.faces[facet[block]]], closest)
         return facet, weights
 
     def normals(self, queries: Vectors) -> FaceVectors:
-        """Return the normal of the surface at the closest point to each query (n, 3), of any length.
+        """Return the pseudonormal (n, 3), not normalised, at the closest point to each query (n, 3).
 
-        Inside a facet that is the facet's normal, on an edge the sum of the unit normals of the faces there, at a
-        point their sum weighted by the angles at the point. On an edge whose faces lie on each other it is zero.
+        In the interior of a facet this is the facet's unit normal, on an edge the sum of the unit normals of its
+        faces, at a vertex their sum weighted by the corner angles. Opposite normals on an edge give exactly zero.
 
         References
         ----------
@@ -59,9 +60,9 @@ class ClosestPoints:
         """
         return self.normals_at(*self.locate(queries))
 
-    def normals_at(self, facet: Rows, weights: Vectors) -> FaceVectors:
-        """Return the same for points given by facet (n,) and barycentric coordinates (n, 3)."""
-        at_zero = weights < _ON_SIDE
+    def normals_at(self, facet: Facets, weights: Vectors) -> FaceVectors:
+        """Return the pseudonormals (n, 3) at points given by facet (n,) and barycentric coordinates (n, 3)."""
+        at_zero = weights < _ON_SIDE_WEIGHT
         normals = self.surface.face_normals[facet].copy()
         on_edge = np.flatnonzero(at_zero.sum(axis=1) == 1)
         edge = self.surface.face_edges[facet[on_edge], np.argmax(at_zero[on_edge], axis=1)]
@@ -72,49 +73,50 @@ class ClosestPoints:
         return normals
 
     def inverted(self, corners: Vectors) -> FaceMask:
-        """Return which triangles (n, 3, 3) face away from the surface where it is closest to their barycentre.
+        """Return which triangles (n, 3, 3) face away from the surface at the point closest to their barycentre.
 
-        A triangle without area is not turned, nor is one at a right angle to the surface. Where two sheets of the
-        surface lie on each other and face opposite ways, one of them is enough.
+        Triangles without area and triangles perpendicular to the surface are not inverted. Where two sheets of the
+        surface coincide with opposite orientations, a triangle may face either of them.
         """
         normals = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
-        return np.asarray(self._cosines(normals, corners.mean(axis=1)) < -_ROUNDING)
+        return np.asarray(self._cosines(normals, corners.mean(axis=1)) < -_NORMAL_ROUNDING)
 
     def clearly_facing(self, corners: Vectors) -> FaceMask:
-        """Return which triangles (n, 3, 3) are not turned by a margin.
+        """Return which triangles (n, 3, 3) are not inverted by a margin.
 
-        Also where the surface is closest to points a little over and under the barycentre, the normals agree by more
-        than rounding. A triangle half way between the two sides of a thin part, or in a concave corner, is turned or
-        not by the rounding of distances alone; it does not face clearly.
+        The normals must agree at the points closest to the barycentre and to two points slightly above and below it.
+        Halfway between the two sides of a thin part, or in a concave corner, rounding alone would decide whether a
+        triangle is inverted; such a triangle does not face the surface clearly.
         """
         normals = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
         centre = corners.mean(axis=1)
-        lift = _MARGIN * unit(normals) * np.sqrt(np.linalg.norm(normals, axis=1, keepdims=True))
-        cosines = [self._cosines(normals, place) for place in (centre, centre + lift, centre - lift)]
-        return np.asarray(np.min(cosines, axis=0) > _CLEAR)
+        offset = _NORMAL_OFFSET * unit(normals) * np.sqrt(np.linalg.norm(normals, axis=1, keepdims=True))
+        cosines = [self._cosines(normals, query) for query in (centre, centre + offset, centre - offset)]
+        return np.asarray(np.min(cosines, axis=0) > _MIN_FACING_COSINE)
 
     def _cosines(self, normals: Vectors, queries: Vectors) -> npt.NDArray[np.float64]:
-        """Return the cosine (n,) between normals of any length and those of the surface closest to the queries.
+        """Return the cosine (n,) between normals (n, 3) of any length and the pseudonormals closest to the queries.
 
-        Where a sheet of the surface lies on the closest one, the larger cosine.
+        Where an opposite facet coincides with the closest one, return the larger cosine.
         """
         facet, weights = self.locate(queries)
         normals = unit(normals)
         cosines = np.einsum("nx,nx->n", normals, unit(self.normals_at(facet, weights)))
-        against = np.flatnonzero(cosines < _CLEAR)
-        if len(against) == 0 or self._opposite.nnz == 0:
+        opposed = np.flatnonzero(cosines < _MIN_FACING_COSINE)
+        if len(opposed) == 0 or self._opposite_facets.nnz == 0:
             return np.asarray(cosines)
-        start, count = self._opposite.indptr[facet[against]], np.diff(self._opposite.indptr)[facet[against]]
-        which = np.repeat(against, count)
-        other = self._opposite.indices[np.repeat(start + count - np.cumsum(count), count) + np.arange(count.sum())]
-        place = np.einsum("nc,ncx->nx", weights[which], self.surface.points[self.surface.faces[facet[which]]])
-        there = squared_distances_to(self.surface.points[self.surface.faces[other]], place)
-        same = there <= (_SAME_SHEET * self.surface.diagonal) ** 2
-        found = np.einsum("nx,nx->n", normals[which], self.surface.face_normals[other])
-        np.maximum.at(cosines, which[same], found[same])
+        table = self._opposite_facets
+        start, count = table.indptr[facet[opposed]], np.diff(table.indptr)[facet[opposed]]
+        query = np.repeat(opposed, count)
+        other = table.indices[np.repeat(start + count - np.cumsum(count), count) + np.arange(count.sum())]
+        closest = np.einsum("nc,ncx->nx", weights[query], self.surface.points[self.surface.faces[facet[query]]])
+        squared = squared_distances_to(self.surface.points[self.surface.faces[other]], closest)
+        coincide = squared <= (_COINCIDENT_DISTANCE * self.surface.diagonal) ** 2
+        other_cosines = np.einsum("nx,nx->n", normals[query], self.surface.face_normals[other])
+        np.maximum.at(cosines, query[coincide], other_cosines[coincide])
         return np.asarray(cosines)
 
-    def _query(self, queries: Vectors) -> tuple[npt.NDArray[np.float64], Rows, Vectors]:
+    def _query(self, queries: Vectors) -> tuple[npt.NDArray[np.float64], Facets, Vectors]:
         queries = np.ascontiguousarray(queries, dtype=np.float64).reshape(-1, 3)
         if len(queries) == 0:
             return np.zeros(0), np.zeros(0, dtype=np.int64), np.zeros((0, 3))
@@ -122,61 +124,63 @@ class ClosestPoints:
         return np.asarray(squared), np.asarray(facet, dtype=np.int64), np.asarray(closest)
 
     @cached_property
-    def _opposite(self) -> csr_array:
-        """Facets that lie on each facet and face the other way (F, F)."""
+    def _opposite_facets(self) -> csr_array:
+        """Pairs of coincident facets of opposite orientation, as a symmetric matrix (F, F)."""
         surface = self.surface
         first, second = self_intersections(surface).T
         normals, size = surface.face_normals, surface.n_faces
-        apart = surface.points[surface.faces[second]] - surface.points[surface.faces[first, 0]][:, None]
-        height = np.abs(np.einsum("ncx,nx->nc", apart, normals[first])).max(axis=1)
-        flat = (height <= _SAME_SHEET * surface.diagonal) & (
-            np.einsum("nx,nx->n", normals[first], normals[second]) < 0.0
-        )
-        rows, columns = np.concatenate([[first, second], [second, first]], axis=1)[:, np.tile(flat, 2)]
+        offsets = surface.points[surface.faces[second]] - surface.points[surface.faces[first, 0]][:, None]
+        height = np.abs(np.einsum("ncx,nx->nc", offsets, normals[first])).max(axis=1)
+        opposite = np.einsum("nx,nx->n", normals[first], normals[second]) < 0.0
+        opposite &= height <= _COINCIDENT_DISTANCE * surface.diagonal
+        rows, columns = np.concatenate([[first, second], [second, first]], axis=1)[:, np.tile(opposite, 2)]
         return csr_array((np.ones(len(rows), dtype=np.int8), (rows, columns)), shape=(size, size))
 
     @cached_property
     def _edge_normals(self) -> Vectors:
         surface = self.surface
-        return _summed(surface.face_edges, np.ones((surface.n_faces, 3)), surface.face_normals, len(surface.edges))
+        return _normal_sums(surface.face_edges, np.ones((surface.n_faces, 3)), surface.face_normals, len(surface.edges))
 
     @cached_property
     def _point_normals(self) -> Vectors:
         surface = self.surface
-        return _summed(
+        return _normal_sums(
             surface.faces, corner_angles(surface.points[surface.faces]), surface.face_normals, surface.n_points
         )
 
 
 def barycentric(corners: npt.NDArray[np.float64], points: Points) -> npt.NDArray[np.float64]:
-    """Return barycentric coordinates (n, 3) of points of triangles (n, 3, 3); on a flat one, along its longest side."""
+    """Return barycentric coordinates (n, 3) of points (n, 3) in triangles (n, 3, 3), one point for each triangle.
+
+    In a triangle without area, only the two ends of its longest side have weights.
+    """
     sides = corners[:, [2, 0, 1]] - corners[:, [1, 2, 0]]
     normal = np.cross(sides[:, 1], sides[:, 2])
     squared = np.einsum("nx,nx->n", normal, normal)
-    longest_squared = np.einsum("ncx,ncx->nc", sides, sides)
+    length_squared = np.einsum("ncx,ncx->nc", sides, sides)
     to_corners = corners - points[:, None, :]
     parts = np.cross(to_corners[:, [1, 2, 0]], to_corners[:, [2, 0, 1]])
     weights = np.einsum("ncx,nx->nc", parts, normal)
-    flat = squared <= 1e-20 * longest_squared.max(axis=1) ** 2
+    flat = squared <= _FLAT_SQUARED_RATIO * length_squared.max(axis=1) ** 2
     weights = np.maximum(np.where(flat[:, None], 0.0, weights), 0.0)
     rows = np.flatnonzero(flat)
-    side = np.argmax(longest_squared[rows], axis=1)
+    side = np.argmax(length_squared[rows], axis=1)
     start, end = (side + 1) % 3, (side + 2) % 3
     along = np.einsum("nx,nx->n", points[rows] - corners[rows, start], sides[rows, side])
-    length = longest_squared[rows, side]
-    share = np.clip(np.divide(along, length, out=np.zeros_like(along), where=length > 0.0), 0.0, 1.0)
-    weights[rows, start], weights[rows, end] = 1.0 - share, share
+    length = length_squared[rows, side]
+    fraction = np.clip(np.divide(along, length, out=np.zeros_like(along), where=length > 0.0), 0.0, 1.0)
+    weights[rows, start], weights[rows, end] = 1.0 - fraction, fraction
     return np.asarray(weights / weights.sum(axis=1, keepdims=True))
 
 
 def squared_distances_to(corners: Vectors, points: Vectors) -> npt.NDArray[np.float64]:
-    """Return the squared distance (n,) of points (n, 3) to triangles (n, 3, 3), one to one."""
+    """Return the squared distance (n,) of each point (n, 3) to the triangle (n, 3, 3) of the same index."""
     sides = corners[:, [1, 2, 0]] - corners
     to_point = points[:, None, :] - corners
-    length = np.einsum("ncx,ncx->nc", sides, sides)
-    share = np.einsum("ncx,ncx->nc", to_point, sides)
-    share = np.clip(np.divide(share, length, out=np.zeros_like(share), where=length > 0.0), 0.0, 1.0)
-    to_sides = to_point - share[:, :, None] * sides
+    length_squared = np.einsum("ncx,ncx->nc", sides, sides)
+    fraction = np.einsum("ncx,ncx->nc", to_point, sides)
+    fraction = np.divide(fraction, length_squared, out=np.zeros_like(fraction), where=length_squared > 0.0)
+    to_sides = to_point - np.clip(fraction, 0.0, 1.0)[:, :, None] * sides
     squared = np.einsum("ncx,ncx->nc", to_sides, to_sides).min(axis=1)
     normal = unit(np.cross(sides[:, 0], sides[:, 1]))
     inside = (np.einsum("ncx,nx->nc", np.cross(sides, to_point), normal) >= 0.0).all(axis=1) & normal.any(axis=1)
@@ -184,15 +188,15 @@ def squared_distances_to(corners: Vectors, points: Vectors) -> npt.NDArray[np.fl
     return np.asarray(np.where(inside, height**2, squared))
 
 
-def _summed(
+def _normal_sums(
     target: npt.NDArray[np.int32], weight: npt.NDArray[np.float64], normals: Vectors, size: int
 ) -> npt.NDArray[np.float64]:
-    """Return the face normals summed over the edges or points (F, 3) of the faces, with weights (F, 3).
+    """Return the weighted sums (size, 3) of face normals at edges or points; ``target`` and ``weight`` are (F, 3).
 
-    Sums that are rounding alone, where faces lie on each other and face opposite ways, are zero.
+    Sums of opposite normals, which consist of rounding errors only, are set to zero.
     """
     terms = weight[:, :, None] * normals[:, None, :]
     columns = [np.bincount(target.ravel(), terms[:, :, axis].ravel(), minlength=size) for axis in range(3)]
     sums: Vectors = np.stack(columns, axis=1).astype(np.float64)
-    sums[np.linalg.norm(sums, axis=1) < _ROUNDING] = 0.0
+    sums[np.linalg.norm(sums, axis=1) < _NORMAL_ROUNDING] = 0.0
     return sums

@@ -1,4 +1,7 @@
-"""Distances between two surfaces, from points of each to the other surface itself (no sampling floor)."""
+"""Distances between two surfaces, from sampled points of each to the closest point of the other.
+
+The search for a vertex count and the pictures use them as well as the evaluation.
+"""
 
 from __future__ import annotations
 
@@ -16,14 +19,14 @@ from anisomesh.mesh.surface import Surface
 
 @dataclass(frozen=True, kw_only=True)
 class SurfaceDistance:
-    """Distances between surfaces a and b in model units; ``ab`` goes from points of a to the surface b.
+    """Distances between surfaces a and b in model units; ``ab`` is from points of a to the surface b.
 
     Attributes
     ----------
     max_ab, max_ba
-        Largest distance found (a lower bound of the one-sided Hausdorff distance).
+        Largest sampled distance, a lower bound of the one-sided Hausdorff distance.
     mean_square_ab, mean_square_ba
-        Mean squared distance over the area, in units squared.
+        Squared distance averaged over the area, in model units squared.
     """
 
     max_ab: float
@@ -43,7 +46,7 @@ class SurfaceDistance:
 
     @property
     def hausdorff(self) -> float:
-        """The larger of the two maxima."""
+        """Symmetric Hausdorff distance, the larger of the two maxima."""
         return max(self.max_ab, self.max_ba)
 
     @property
@@ -52,7 +55,7 @@ class SurfaceDistance:
         return float(np.sqrt(0.5 * (self.mean_square_ab + self.mean_square_ba)))
 
     def as_dict(self) -> dict[str, Any]:
-        """Return all values under their names, for JSON."""
+        """Return a dictionary of all fields and derived values, for JSON."""
         derived = {name: getattr(self, name) for name in ("rms_ab", "rms_ba", "rms", "hausdorff")}
         return {**asdict(self), **derived}
 
@@ -60,45 +63,45 @@ class SurfaceDistance:
 def surface_distance(
     a: Surface, b: Surface, samples: int = 100_000, seed: int | np.random.Generator = 0
 ) -> SurfaceDistance:
-    """Return the distances between two surfaces both ways.
+    """Measure the distances between two surfaces in both directions.
 
     Parameters
     ----------
     a, b
         The surfaces, in the same units.
     samples
-        Number of points drawn uniformly by area on each.
+        Number of points sampled uniformly by area on each surface.
     seed
-        Seed or generator of the sample; the same seed gives the same result.
+        Seed or generator of the samples; equal seeds give equal results.
 
     Raises
     ------
     OptionError
-        If there is no sample.
+        If ``samples`` is less than 1.
 
     Notes
     -----
-    Distances go to the closest point of the other surface, exactly, so a surface is at distance zero from itself,
-    unlike in the sample-to-sample measures. The mean squares are over the samples; the maxima also over every point
-    that a face uses and every midpoint of an edge, where chords are usually farthest off. About 1 s at 100,000
-    samples for surfaces of 10,000 faces.
+    Distances are point-to-surface, so the distance of a surface to itself is zero, unlike in sample-to-sample
+    measures. The mean squares are over the samples; the maxima also include all vertices and edge midpoints, where
+    chords usually deviate most. Takes about 1 s at 100,000 samples for surfaces of 10,000 faces.
     """
     if samples < 1:
         raise OptionError(f"samples is {samples}; expected at least 1")
     rng = np.random.default_rng(seed)
-    max_ab, mean_ab = _one_way(a, b, samples, rng)
-    max_ba, mean_ba = _one_way(b, a, samples, rng)
+    max_ab, mean_ab = _one_sided(a, b, samples, rng)
+    max_ba, mean_ba = _one_sided(b, a, samples, rng)
     return SurfaceDistance(max_ab=max_ab, max_ba=max_ba, mean_square_ab=mean_ab, mean_square_ba=mean_ba)
 
 
 def squared_distances(points: Points, surface: Surface) -> Floats:
-    """Return the squared distance (n,) of each point to the closest point of a surface."""
+    """Return the squared distance (n,) of each point (n, 3) to a surface, in model units squared."""
     return ClosestPoints(surface).squared_distances(points)
 
 
-def _one_way(a: Surface, b: Surface, samples: int, rng: np.random.Generator) -> tuple[float, float]:
-    corners = a.points[np.unique(a.faces)]
+def _one_sided(a: Surface, b: Surface, samples: int, rng: np.random.Generator) -> tuple[float, float]:
+    """Return the maximum and the mean square of the distances from a to b."""
+    vertices = a.points[np.unique(a.faces)]
     midpoints = a.points[a.edges].mean(axis=1)
-    queries = np.concatenate([points_on_faces(a, samples, rng)[0], corners, midpoints])
+    queries = np.concatenate([points_on_faces(a, samples, rng)[0], vertices, midpoints])
     squared = squared_distances(queries, b)
     return float(np.sqrt(squared.max())), float(squared[:samples].mean())

@@ -1,4 +1,4 @@
-"""Pairs of triangles of a surface that intersect."""
+"""Self-intersections: the pairs of triangles of a surface that intersect, decided exactly."""
 
 from __future__ import annotations
 
@@ -12,9 +12,9 @@ from anisomesh.mesh.geometry import unit
 from anisomesh.mesh.surface import Surface
 from anisomesh.mesh.weld import coincident
 
-_LEAF = 4  # most faces in a leaf of the tree
-_LEAST_ROOM = 65_536  # pairs that a block has room for at least
-_SLAB_ERROR = 1e-14  # more than the rounding error of two products of vectors of length 1
+_FACES_PER_LEAF = 4  # maximal number of faces in a leaf of the bounding-box tree; heuristic, changes only the time
+_MIN_PAIR_BUFFER = 65_536  # pairs, least size of the buffer that the kernel fills; changes only the time
+_SLAB_MARGIN = 1e-14  # exceeds twice the rounding error of products of unit vectors and points in [-1, 1]^3
 
 Pairs = npt.NDArray[np.int32]
 
@@ -22,27 +22,26 @@ Pairs = npt.NDArray[np.int32]
 def self_intersections(surface: Surface) -> Pairs:
     """Return the pairs of faces (n, 2) that intersect, lower index first, in lexicographic order.
 
-    Points with equal coordinates are one point, so sheets that were cut apart along an edge do not intersect there.
-    Two faces intersect
+    Vertices with equal coordinates are identified, so that faces do not intersect along an edge that was cut open.
+    Two faces that share
 
-    - without a common point, if the closed triangles have a point in common: touching counts;
-    - with one common point, if they have another point in common besides it;
-    - with two common points, if they lie in one plane on the same side of their common edge, folded onto each other;
-    - with the same three points.
+    - no vertex intersect if the closed triangles have a common point: touching counts;
+    - one vertex intersect if they have a second common point;
+    - two vertices intersect if they are coplanar and on the same side of the shared edge, folded onto each other;
+    - three vertices intersect.
 
-    Faces without area, whose points are exactly collinear or repeated, are left out.
+    Faces whose vertices are exactly collinear or repeated are ignored.
 
     Parameters
     ----------
     surface
-        Any triangles; they need be neither manifold nor oriented.
+        Any surface; it need be neither manifold nor oriented.
 
     Notes
     -----
-    Decisions are exact for the coordinates as they are, as long as none but zero is smaller than 1e-90 times the
-    largest. Candidates are pairs of overlapping bounding boxes; they are not stored, so the memory taken is
-    proportional to the faces and the pairs found. Faces that are long, thin and oblique to the axes overlap many
-    boxes, which costs time only.
+    The predicates are exact as long as no nonzero coordinate is smaller than 1e-90 times the largest. Candidates are
+    pairs of overlapping bounding boxes; they are not stored, so that memory is proportional to the number of faces
+    and of pairs found. Long thin faces oblique to the axes overlap many boxes, which takes more time.
 
     References
     ----------
@@ -58,24 +57,24 @@ def self_intersections(surface: Surface) -> Pairs:
     faces, axes = faces[with_area], axes[with_area]
 
     boxes = _boxes(points, faces)
-    depth = max(0, (len(faces) - 1) // _LEAF).bit_length()
+    depth = max(0, (len(faces) - 1) // _FACES_PER_LEAF).bit_length()
     order = np.arange(len(faces))
     kernels.sort_into_tree(0.5 * (boxes[:, :3] + boxes[:, 3:]), order, depth)
     boxes, faces, axes = boxes[order], faces[order], axes[order]
-    nodes, slabs = _nodes(boxes, depth), _slabs(points, faces)
+    nodes, slabs = _node_boxes(boxes, depth), _slabs(points, faces)
 
     stack = np.empty((depth + 2, 2), dtype=np.int64)
-    room = np.empty((max(len(faces), _LEAST_ROOM), 2), dtype=np.int32)
+    buffer = np.empty((max(len(faces), _MIN_PAIR_BUFFER), 2), dtype=np.int32)
     blocks, face = [], 0
     while face < len(faces):
-        face, written = kernels.find_pairs(face, points, faces, axes, boxes, slabs, nodes, depth, stack, room)
-        blocks.append(room[:written].copy())
+        face, written = kernels.find_pairs(face, points, faces, axes, boxes, slabs, nodes, depth, stack, buffer)
+        blocks.append(buffer[:written].copy())
     pairs = np.sort(with_area[order[np.concatenate(blocks)]], axis=1)
     return np.asarray(pairs[np.lexsort((pairs[:, 1], pairs[:, 0]))], dtype=np.int32)
 
 
 def _welded(surface: Surface) -> tuple[Points, Faces]:
-    """Return the points in use, each once and scaled by a power of two to be at most 1, and the faces on them."""
+    """Return the distinct vertices, scaled by a power of two to at most 1, and the faces (F, 3) on them."""
     used, inverse = np.unique(coincident(surface.points)[surface.faces], return_inverse=True)
     points = surface.points[used]
     points = np.ldexp(points, -np.frexp(np.abs(points).max())[1])
@@ -83,28 +82,28 @@ def _welded(surface: Surface) -> tuple[Points, Faces]:
 
 
 def _boxes(points: Points, faces: Faces) -> npt.NDArray[np.float64]:
-    """Return lower and upper bounds (F, 6) of the faces."""
+    """Return the bounding boxes (F, 6) of the faces, lower and upper corner."""
     corners = points[faces]
     return np.concatenate([corners.min(axis=1), corners.max(axis=1)], axis=1)
 
 
 def _slabs(points: Points, faces: Faces) -> npt.NDArray[np.float64]:
-    """Return the narrowest slab around each face, in its plane: a direction and two bounds, (F, 5).
+    """Return the narrowest slab (F, 5) around each face in its plane: unit direction, lower and upper bound.
 
-    Boxes of long, thin and oblique triangles that lie side by side overlap; their slabs do not. The bounds allow for
-    the rounding of products of points, which are at most 1, with the direction.
+    The boxes of long thin triangles side by side overlap, their slabs do not. The bounds include the rounding error
+    of dot products with the direction, as coordinates are at most 1.
     """
     corners = points[faces]
     sides = corners[:, [2, 0, 1]] - corners[:, [1, 2, 0]]
     longest = np.argmax(np.linalg.norm(sides, axis=2), axis=1)
     direction = unit(np.cross(np.cross(sides[:, 1], sides[:, 2]), sides[np.arange(len(faces)), longest]))
     heights = np.einsum("fcx,fx->fc", corners, direction)
-    low, high = heights.min(axis=1) - _SLAB_ERROR, heights.max(axis=1) + _SLAB_ERROR
+    low, high = heights.min(axis=1) - _SLAB_MARGIN, heights.max(axis=1) + _SLAB_MARGIN
     return np.concatenate([direction, low[:, None], high[:, None]], axis=1)
 
 
-def _nodes(boxes: npt.NDArray[np.float64], depth: int) -> npt.NDArray[np.float64]:
-    """Return lower and upper bounds of the nodes of the complete tree over boxes (F, 6) in its order."""
+def _node_boxes(boxes: npt.NDArray[np.float64], depth: int) -> npt.NDArray[np.float64]:
+    """Return the boxes (2^(depth + 1) - 1, 6) of the nodes of the complete tree over boxes (F, 6) in tree order."""
     first = (len(boxes) * np.arange(1 << depth)) >> depth
     low = np.minimum.reduceat(boxes[:, :3], first)
     high = np.maximum.reduceat(boxes[:, 3:], first)

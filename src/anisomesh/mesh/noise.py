@@ -1,4 +1,4 @@
-"""Noise on the points of a surface."""
+"""Synthetic noise on the points of a surface, for training, tests and benchmarks."""
 
 from __future__ import annotations
 
@@ -13,29 +13,30 @@ NOISES: tuple[Noise, ...] = ("independent", "normal", "smooth")
 
 
 def with_noise(surface: Surface, noise: float, rng: np.random.Generator, kind: Noise = "independent") -> Surface:
-    """Return a surface with noise of this deviation, in mean edge lengths.
+    """Return a copy of a surface with Gaussian noise added to its points.
 
     Parameters
     ----------
     surface
-        The surface.
+        Any surface.
     noise
-        Deviation of every coordinate, or of the height along the normal.
+        Standard deviation of each coordinate, or of the offset along the normal, over the mean edge length.
     rng
-        Of the noise.
+        Generator of the noise.
     kind
-        ``"independent"``, every coordinate by itself; ``"normal"``, along the normals alone, as of a scanner that looks
-        from there; ``"smooth"``, half as much, alike at neighbours.
+        ``"independent"``: independent coordinates; ``"normal"``: offsets along the point normals, as from a scanner;
+        ``"smooth"``: half the deviation, correlated between neighbours.
     """
     if noise == 0.0:
         return surface
-    size = noise * float(surface.edge_lengths.mean())
-    away = rng.normal(0.0, size, surface.points.shape)
+    deviation = noise * float(surface.edge_lengths.mean())
+    offsets = rng.normal(0.0, deviation, surface.points.shape)
     if kind == "normal":
-        away = away[:, :1] * surface.point_normals
+        offsets = offsets[:, :1] * surface.point_normals
     elif kind == "smooth":
+        size = len(offsets)
         ends = np.concatenate([surface.edges, surface.edges[:, ::-1]])
-        total = np.stack([np.bincount(ends[:, 0], away[ends[:, 1], axis], len(away)) for axis in range(3)], axis=1)
-        count = np.bincount(ends[:, 0], minlength=len(away))[:, None]
-        away = (away + total) / (2.0 * np.sqrt(count + 1.0))
-    return surface.with_points(surface.points + away)
+        sums = np.stack([np.bincount(ends[:, 0], offsets[ends[:, 1], axis], size) for axis in range(3)], axis=1)
+        count = np.bincount(ends[:, 0], minlength=size)[:, None]
+        offsets = (offsets + sums) / (2.0 * np.sqrt(count + 1.0))
+    return surface.with_points(surface.points + offsets)

@@ -1,4 +1,4 @@
-"""Splitting long edges without changing the surface."""
+"""Subdivision of long edges that does not change the surface as a point set."""
 
 from __future__ import annotations
 
@@ -8,41 +8,40 @@ from dataclasses import dataclass
 import numpy as np
 import numpy.typing as npt
 
-from anisomesh._arrays import FaceIndices, FaceLabels
+from anisomesh._arrays import EdgeMask, FaceIndices, FaceLabels
 from anisomesh.errors import OptionError
 from anisomesh.mesh.surface import Surface
 
 logger = logging.getLogger(__name__)
 
-EdgeMask = npt.NDArray[np.bool_]
-
-# Triangles for 0, 1, 2, 3 split sides, and for 2 with the other diagonal. Nodes 0-2 are the corners, 3-5 the
-# middles of the sides opposite them.
-PATTERNS = (
-    np.array([[0, 1, 2]]),
-    np.array([[0, 1, 3], [0, 3, 2]]),
-    np.array([[0, 5, 4], [5, 1, 2], [5, 2, 4]]),
-    np.array([[0, 5, 4], [5, 1, 3], [4, 3, 2], [3, 4, 5]]),
-    np.array([[0, 5, 4], [5, 1, 4], [1, 2, 4]]),
+# Triangles that replace a face, by the number of its split sides. Nodes 0-2 are the corners of the face and 3-5 the
+# midpoints of the sides opposite them. The face is rotated so that the one split side, or the one whole side of two
+# split ones, is opposite corner 0; the quadrilateral 5, 1, 2, 4 is then cut along its shorter diagonal.
+_SPLIT_PATTERNS = (
+    np.array([[0, 1, 2]]),  # no side
+    np.array([[0, 1, 3], [0, 3, 2]]),  # one side
+    np.array([[0, 5, 4], [5, 1, 2], [5, 2, 4]]),  # two sides, diagonal 5-2
+    np.array([[0, 5, 4], [5, 1, 3], [4, 3, 2], [3, 4, 5]]),  # three sides
+    np.array([[0, 5, 4], [5, 1, 4], [1, 2, 4]]),  # two sides, diagonal 1-4
 )
 
 
 @dataclass(frozen=True, kw_only=True)
 class Subdivision:
-    """A subdivided surface and how it lies on its parent.
+    """A subdivided surface and its position on the parent surface.
 
-    Parameters
+    Attributes
     ----------
     surface
-        The refined surface; its first points are the parent's, unchanged.
+        The subdivided surface; its first V points are the parent's points, unchanged.
     parent_face
-        The parent's face that each face (F',) lies in.
+        For every face (F',) the parent's face that contains it.
     point_corners
-        Three points of the parent (V', 3) for every point.
+        For every point (V', 3) three points of the parent; a point of the parent itself is repeated.
     barycentric
-        Their weights (V', 3): point = sum of weight times corner; a parent's point is its own first corner.
+        Their weights (V', 3): a point is the sum of weights times corners.
     complete
-        Whether no edge is too long any more; False if the limit on faces came first.
+        Whether all edges are short enough; False if the limit on the number of faces was reached.
     """
 
     surface: Surface
@@ -52,39 +51,38 @@ class Subdivision:
     complete: bool
 
     def interpolate(self, values: npt.NDArray[np.float64]) -> npt.NDArray[np.float64]:
-        """Return values (V', ...) at the refined points from values (V, ...) at the parent's points."""
+        """Interpolate values (V, ...) at the parent's points linearly to all points (V', ...)."""
         values = np.asarray(values, dtype=np.float64)
         return np.asarray(np.einsum("vc,vc...->v...", self.barycentric, values[self.point_corners]))
 
 
 def split_long_edges(surface: Surface, max_length: float, *, max_faces: int) -> Subdivision:
-    """Split every edge longer than ``max_length`` at its middle until none is left.
+    """Split every edge longer than ``max_length`` at its midpoint until none is left.
 
     Parameters
     ----------
     surface
         The parent surface.
     max_length
-        Length (model units) that no edge of the result exceeds.
+        Upper bound on edge lengths of the result, in model units.
     max_faces
-        The result has at most this many faces; reaching it ends the work early, which ``complete`` tells.
+        Upper bound on the number of faces of the result. If a pass would exceed it, only the longest edges are split
+        and the result is not ``complete``.
 
     Raises
     ------
     OptionError
-        If ``max_length`` is not positive and finite or ``max_faces`` is below the number of faces there are.
+        If ``max_length`` is not positive and finite, or ``max_faces`` is less than the number of faces.
 
     Notes
     -----
-    Each pass splits all long edges at once, so that neighbours agree: a face with one, two or three split sides
-    becomes two, three or four faces; with two, the rest is a quadrilateral cut along its shorter diagonal. The
-    surface as a set of points, its boundary and its topology stay the same. Linear in the number of faces of
-    the result. When a pass would exceed the limit only the longest edges that fit are split.
+    Each pass splits all long edges at once: a face with one, two or three split sides becomes two, three or four
+    faces. Geometry, boundary and topology of the surface do not change. Linear in the number of resulting faces.
     """
     if not (np.isfinite(max_length) and max_length > 0):
         raise OptionError(f"max_length is {max_length:g}; expected a positive length in model units")
     if max_faces < surface.n_faces:
-        raise OptionError(f"max_faces is {max_faces:,} but the surface has {surface.n_faces:,} faces already")
+        raise OptionError(f"max_faces is {max_faces:,}; expected at least the surface's {surface.n_faces:,} faces")
     current = surface
     parent = np.arange(surface.n_faces, dtype=np.int32)
     weights = np.broadcast_to(np.eye(3), (surface.n_faces, 3, 3))
@@ -93,7 +91,12 @@ def split_long_edges(surface: Surface, max_length: float, *, max_faces: int) -> 
         parent = parent[origin]
     complete = not bool((current.edge_lengths > max_length).any())
     if not complete:
-        logger.info("stopped at %d faces (limit %d) with edges over %g left", current.n_faces, max_faces, max_length)
+        logger.info(
+            "subdivision stopped at %d of at most %d faces; some edges exceed %g",
+            current.n_faces,
+            max_faces,
+            max_length,
+        )
     point_corners = np.repeat(np.arange(current.n_points, dtype=np.int32)[:, None], 3, axis=1)
     barycentric = np.tile([1.0, 0.0, 0.0], (current.n_points, 1))
     added = current.faces >= surface.n_points
@@ -105,7 +108,7 @@ def split_long_edges(surface: Surface, max_length: float, *, max_faces: int) -> 
 
 
 def _edges_to_split(surface: Surface, max_length: float, budget: int) -> EdgeMask:
-    """Return the edges that are too long; the longest that fit if all of them would add too many faces."""
+    """Return which edges (E,) exceed the length; only the longest if splitting all would add more than ``budget``."""
     split = surface.edge_lengths > max_length
     long = np.flatnonzero(split)
     if surface.edge_face_count[long].sum() > budget:
@@ -117,30 +120,28 @@ def _edges_to_split(surface: Surface, max_length: float, budget: int) -> EdgeMas
 def _split(
     surface: Surface, weights: npt.NDArray[np.float64], split: EdgeMask
 ) -> tuple[Surface, FaceLabels, npt.NDArray[np.float64]]:
-    """Split these edges; return the new surface, the old face of each new one and its corner weights (F', 3, 3)."""
-    middle = np.full(len(split), -1, dtype=np.int32)
-    middle[split] = surface.n_points + np.arange(split.sum())
+    """Split edges once; return the surface, the old face of each new face (F',) and its corner weights (F', 3, 3)."""
+    edge_midpoint = np.full(len(split), -1, dtype=np.int32)
+    edge_midpoint[split] = surface.n_points + np.arange(split.sum())
     ends = surface.points[surface.edges[split]]
     points = np.concatenate([surface.points, 0.5 * (ends[:, 0] + ends[:, 1])])
-    middles = middle[surface.face_edges]
-    has = middles >= 0
-    count = has.sum(axis=1)
-    # Turn the faces so that the only split side, or the only whole one, is opposite the first corner.
-    odd_one = np.where(count == 1, has.argmax(axis=1), has.argmin(axis=1) * (count == 2))
-    turn = (odd_one[:, None] + np.arange(3)) % 3
+    midpoints = edge_midpoint[surface.face_edges]
+    is_split = midpoints >= 0
+    count = is_split.sum(axis=1)
+    first_corner = np.where(count == 1, is_split.argmax(axis=1), is_split.argmin(axis=1) * (count == 2))
+    rotation = (first_corner[:, None] + np.arange(3)) % 3
     rows = np.arange(surface.n_faces)[:, None]
-    nodes = np.concatenate([surface.faces[rows, turn], middles[rows, turn]], axis=1)
-    w = weights[rows, turn]
+    nodes = np.concatenate([surface.faces[rows, rotation], midpoints[rows, rotation]], axis=1)
+    w = weights[rows, rotation]
     node_weights = np.concatenate([w, 0.5 * (w[:, [1, 2, 0]] + w[:, [2, 0, 1]])], axis=1)
-    across = np.linalg.norm(points[nodes[:, [5, 1]]] - points[nodes[:, [2, 4]]], axis=2)
-    pattern = np.where((count == 2) & (across[:, 0] > across[:, 1]), 4, count)
+    diagonals = np.linalg.norm(points[nodes[:, [5, 1]]] - points[nodes[:, [2, 4]]], axis=2)
+    pattern = np.where((count == 2) & (diagonals[:, 0] > diagonals[:, 1]), 4, count)
     origin, corners = [], []
-    for number, triangles in enumerate(PATTERNS):
+    for number, triangles in enumerate(_SPLIT_PATTERNS):
         chosen = np.flatnonzero(pattern == number)
         origin.append(np.repeat(chosen, len(triangles)))
         corners.append(np.tile(triangles, (len(chosen), 1)))
     old, local = np.concatenate(origin), np.concatenate(corners)
     order = np.argsort(old, kind="stable")
     old, local = old[order], local[order]
-    refined = Surface(points, nodes[old[:, None], local])
-    return refined, old.astype(np.int32), node_weights[old[:, None], local]
+    return Surface(points, nodes[old[:, None], local]), old.astype(np.int32), node_weights[old[:, None], local]
