@@ -1,37 +1,68 @@
-"""What every test may use: the command line in a process of its own, small meshes, the folder of real meshes."""
+"""Shared fixtures: the command line, small meshes, the folder of real meshes; Hypothesis profiles."""
 
+import contextlib
+import io
 import os
-import subprocess
 import sys
-from collections.abc import Callable
+import warnings
+from collections.abc import Callable, Iterator
 from pathlib import Path
+from subprocess import CompletedProcess
+from unittest import mock
+
+os.environ.setdefault("OMP_NUM_THREADS", "1")  # before torch is imported: several test workers share the cores
 
 import hypothesis
 import numpy as np
 import pytest
 
-hypothesis.settings.register_profile("anisomesh", deadline=None)
-hypothesis.settings.load_profile("anisomesh")
+hypothesis.settings.register_profile("ci", deadline=None, print_blob=True)
+hypothesis.settings.register_profile("dev", deadline=None, max_examples=15)
+hypothesis.settings.load_profile(os.environ.get("HYPOTHESIS_PROFILE") or ("ci" if os.environ.get("CI") else "dev"))
 
-CLI = [sys.executable, "-c", "from anisomesh.cli.main import run; run()"]
+CLI = [sys.executable, "-m", "anisomesh"]
+
+
+def examples(number: int) -> hypothesis.settings:
+    """Return settings with this number of examples in the profile ``ci``, and at most 15 in ``dev``."""
+    full = hypothesis.settings.get_current_profile_name() == "ci"
+    return hypothesis.settings(max_examples=number if full else min(number, hypothesis.settings().max_examples))
 
 
 @pytest.fixture(scope="session")
-def run_cli() -> Callable[..., subprocess.CompletedProcess[str]]:
-    """Run ``anisomesh`` with the given words and return the finished process."""
+def run_cli() -> Callable[..., CompletedProcess[str]]:
+    """Run ``anisomesh`` with the given arguments in this process and return its exit code and output."""
 
-    def run(*words: object, cwd: Path | None = None, **environment: str) -> subprocess.CompletedProcess[str]:
-        return subprocess.run(
-            [*CLI, *map(str, words)],
-            cwd=cwd,
-            env={**os.environ, "OMP_NUM_THREADS": "1", **environment},
-            capture_output=True,
-            text=True,
-            timeout=300,
-            check=False,
-        )
+    def run(*words: object, cwd: Path | None = None, **environment: str) -> CompletedProcess[str]:
+        from anisomesh.cli.main import main
+
+        arguments = [str(word) for word in words]
+        with (
+            contextlib.chdir(cwd or Path.cwd()),
+            mock.patch.dict(os.environ, environment),
+            contextlib.redirect_stdout(io.StringIO()) as out,
+            contextlib.redirect_stderr(io.StringIO()) as err,
+            _warnings_on_stderr(),
+        ):
+            code = main(arguments)
+        return CompletedProcess(arguments, code, out.getvalue(), err.getvalue())
 
     return run
+
+
+@contextlib.contextmanager
+def _warnings_on_stderr() -> Iterator[None]:
+    """Show warnings as the interpreter does by default, and not as pytest does."""
+
+    def show(message: Warning | str, category: type[Warning], filename: str, lineno: int, *_: object) -> None:
+        sys.stderr.write(warnings.formatwarning(message, category, filename, lineno))
+
+    with warnings.catch_warnings():
+        warnings.resetwarnings()
+        for category in (DeprecationWarning, PendingDeprecationWarning, ImportWarning, ResourceWarning):
+            warnings.simplefilter("ignore", category)
+        warnings.showwarning = show
+        yield
 
 
 def torus_arrays(around: int, across: int) -> tuple[np.ndarray, np.ndarray]:

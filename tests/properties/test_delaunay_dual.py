@@ -6,7 +6,7 @@ import naive_rvd as naive
 import numpy as np
 import pytest
 from delaunay_cases import assert_closed_manifold, dual_case
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 
 from anisomesh.delaunay.delta_complex import simplicial_mesh
@@ -15,6 +15,7 @@ from anisomesh.mesh.surface import Surface
 from anisomesh.shapes import analytic as shapes
 from anisomesh.voronoi.cells import cells_of
 from anisomesh.voronoi.restricted import RestrictedVoronoi
+from conftest import examples
 
 CLOSED = {
     "sphere": (lambda: shapes.sphere(3), 2, 150),
@@ -57,7 +58,7 @@ def test_every_dual_triangle_is_turned_as_the_facet_it_meets_in(shape):
     np.testing.assert_allclose(distance, distance[:, [1, 2, 0]], atol=1e-12)
 
 
-@settings(max_examples=40)
+@examples(40)
 @given(st.sampled_from(["sphere", "torus", "box"]), st.sampled_from([3, 6]), st.integers(1, 40), st.integers(0, 2**32))
 def test_components_and_their_euler_characteristics_are_those_of_glued_polygons(shape, dimension, n, seed):
     surface = {

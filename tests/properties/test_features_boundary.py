@@ -1,9 +1,9 @@
 """Open surfaces: boundary curves, the arcs that cells cut them into, and a remesh whose boundary is the same curve."""
 
 import igl
+import naive_rvd as naive
 import numpy as np
 import pytest
-from tests.reference import naive_rvd as naive
 
 from anisomesh.cvt.boundary import Boundary
 from anisomesh.cvt.features import Features

@@ -1,10 +1,10 @@
 """Creases: as curves between corners, the arcs that cells cut them into, edges of the dual along them."""
 
+import naive_rvd as naive
 import numpy as np
 import pytest
-from tests.reference import naive_rvd as naive
-
 from anisomesh.cvt.creases import Creases, resolved
+
 from anisomesh.cvt.features import Features
 from anisomesh.cvt.optimise import lloyd
 from anisomesh.delaunay.creases import join_along_creases

@@ -12,6 +12,7 @@ from anisomesh.errors import MeshFileError
 from anisomesh.io.meshes import FORMATS, load, save
 from anisomesh.mesh.surface import Surface
 from anisomesh.shapes import analytic as shapes
+from conftest import examples
 
 EXACT = [".obj", ".off", ".ply", ".vtu", ".msh", ".mesh"]
 any_float = st.floats(allow_nan=False, allow_infinity=False)
@@ -26,7 +27,7 @@ def surfaces(draw):
 
 
 @pytest.mark.parametrize("suffix", EXACT)
-@settings(deadline=None, max_examples=25, suppress_health_check=[HealthCheck.function_scoped_fixture])
+@settings(examples(25), suppress_health_check=[HealthCheck.function_scoped_fixture])
 @given(surface=surfaces())
 def test_every_bit_comes_back(tmp_path, suffix, surface):
     path = tmp_path / f"mesh{suffix}"
@@ -108,7 +109,7 @@ PLY_TYPES = {
 }
 
 
-@settings(deadline=None, max_examples=100, suppress_health_check=[HealthCheck.function_scoped_fixture])
+@settings(examples(100), suppress_health_check=[HealthCheck.function_scoped_fixture])
 @given(data=st.data())
 def test_any_ply_layout_is_understood(tmp_path, data):
     """Points and polygons among arbitrary extra properties and elements, in all three encodings."""

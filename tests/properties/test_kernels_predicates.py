@@ -5,10 +5,11 @@ from fractions import Fraction
 
 import naive_rvd as naive
 import numpy as np
-from hypothesis import assume, given, settings
+from hypothesis import assume, given
 from hypothesis import strategies as st
 
 from anisomesh._kernels import predicates
+from conftest import examples
 
 ties = st.integers(0, 3).map(float)
 near_ties = st.tuples(st.integers(0, 2), st.integers(-2, 2)).map(lambda parts: parts[0] + 1.0 + parts[1] * 2.0**-52)
@@ -50,7 +51,7 @@ def test_corner_side_is_exact_and_one_site_owns(w, index, corner):
     assert predicates.corner_side(w[1], w[0], *index[::-1], corner) == -side
 
 
-@settings(max_examples=400)
+@examples(400)
 @given(tables(3), indices(3), st.integers(0, 2))
 def test_edge_side_is_exact(w, index, side):
     truth = edge_truth(naive.perturbed(w, index), side)
@@ -62,7 +63,7 @@ def test_edge_side_is_exact(w, index, side):
     assert predicates.edge_side(w[1], w[0], w[2], index[1], index[0], index[2], a, b) == truth
 
 
-@settings(max_examples=400)
+@examples(400)
 @given(tables(4), indices(4))
 def test_interior_side_is_exact(w, index):
     truth = interior_truth(naive.perturbed(w, index))

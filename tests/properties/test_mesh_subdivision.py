@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 
 from anisomesh.errors import OptionError
@@ -10,6 +10,7 @@ from anisomesh.mesh import topology
 from anisomesh.mesh.subdivision import split_long_edges
 from anisomesh.mesh.surface import Surface
 from anisomesh.shapes import analytic as shapes
+from conftest import examples
 
 CLOSED = {
     "part": shapes.cad_part(4),
@@ -42,7 +43,7 @@ def test_closed_surface_stays_what_it_is(name, share):
     np.testing.assert_array_equal(surface.points[: parent.n_points], parent.points)
 
 
-@settings(deadline=None, max_examples=60)
+@examples(60)
 @given(st.integers(0, 2**32 - 1), st.floats(0.02, 1.5), st.integers(12, 600))
 def test_any_soup_is_covered_by_its_children(seed, share, max_faces):
     """The children of a face lie in its plane and inside it, face the same way and have its area together."""

@@ -5,12 +5,13 @@ from itertools import pairwise
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 
 from anisomesh.mesh import topology
 from anisomesh.mesh.surface import Surface
 from anisomesh.shapes import analytic as shapes
+from conftest import examples
 
 
 @st.composite
@@ -24,7 +25,7 @@ def undirected_sides(faces):
     return [tuple(sorted((face[k - 2], face[k - 1]))) for face in faces.tolist() for k in range(3)]
 
 
-@settings(deadline=None, max_examples=150)
+@examples(150)
 @given(triangle_lists())
 def test_counts_follow_the_definition(faces):
     sides = Counter(undirected_sides(faces))
@@ -35,7 +36,7 @@ def test_counts_follow_the_definition(faces):
     assert topology.is_oriented(faces) == consistent
 
 
-@settings(deadline=None, max_examples=150)
+@examples(150)
 @given(triangle_lists())
 def test_points_with_one_fan_follow_the_definition(faces):
     """A point is manifold if the edges opposite it, joined where they meet, make one path or one cycle."""
@@ -53,7 +54,7 @@ def test_points_with_one_fan_follow_the_definition(faces):
     assert topology.count_nonmanifold_points(faces) == bad
 
 
-@settings(deadline=None, max_examples=150)
+@examples(150)
 @given(triangle_lists())
 def test_components_follow_the_definition(faces):
     count, label = topology.connected_components(faces, 12)
@@ -71,7 +72,7 @@ def test_components_follow_the_definition(faces):
         assert reached == merged[part]
 
 
-@settings(deadline=None, max_examples=150)
+@examples(150)
 @given(triangle_lists())
 def test_loops_use_every_boundary_edge_once(faces):
     boundary = sorted(edge for edge, count in Counter(undirected_sides(faces)).items() if count == 1)
@@ -85,7 +86,7 @@ def test_loops_use_every_boundary_edge_once(faces):
     assert len(walked) + len(topology.boundary_loops(faces)) == len(boundary)
 
 
-@settings(deadline=None, max_examples=60)
+@examples(60)
 @given(st.integers(0, 2**32 - 1), st.integers(1, 30))
 def test_loops_of_a_holed_surface_are_closed_and_run_with_the_faces(seed, n_removed):
     rng = np.random.default_rng(seed)
@@ -107,7 +108,7 @@ def test_known_loops():
     assert sorted(sorted(loop.tolist()) for loop in topology.boundary_loops(tie)) == [[0, 1, 2], [0, 3, 4]]
 
 
-@settings(deadline=None, max_examples=100)
+@examples(100)
 @given(triangle_lists())
 def test_face_tables_agree_with_the_faces(faces):
     surface = Surface(np.random.default_rng(0).normal(size=(9, 3)), faces)

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 from delaunay_cases import assert_closed_manifold
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 
 from anisomesh.features.detect import sharp_edges
@@ -13,6 +13,7 @@ from anisomesh.mesh.surface import Surface
 from anisomesh.meshops.flip import do_flips, flip_for_shape, possible_flips
 from anisomesh.metric.quality import anisotropic_quality
 from anisomesh.shapes.analytic import box, cad_part, open_patch, sphere, torus
+from conftest import examples
 
 SHAPES = {"sphere": sphere(2), "torus": torus(1.0, 0.3, 24, 10), "part": cad_part(5)}
 
@@ -33,7 +34,7 @@ def identity(n):
     return np.tile(np.eye(3), (n, 1, 1))
 
 
-@settings(max_examples=25)
+@examples(25)
 @given(st.sampled_from(sorted(SHAPES)), st.integers(0, 2**32))
 def test_any_flips_in_any_order_leave_a_manifold(name, seed):
     surface = SHAPES[name]

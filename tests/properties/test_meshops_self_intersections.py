@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-from tests.reference.delaunay_cases import assert_closed_manifold
+from delaunay_cases import assert_closed_manifold
 
 from anisomesh.mesh.closest_points import ClosestPoints
 from anisomesh.mesh.intersections import self_intersections

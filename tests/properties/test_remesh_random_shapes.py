@@ -9,10 +9,11 @@ from random_shapes import SHAPES
 from anisomesh.mesh import topology
 from anisomesh.pipeline import remesh
 from anisomesh.repair.prepare import prepare
+from conftest import examples
 
 
 @pytest.mark.parametrize("make", SHAPES)
-@hypothesis.settings(max_examples=8)
+@examples(8)
 @hypothesis.given(seed=st.integers(0, 2**32 - 1), size=st.floats(0.7, 2.6))
 def test_topology_holds_and_what_is_left_is_said(make, seed, size):
     surface = make(np.random.default_rng(seed))

@@ -7,7 +7,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 
 from anisomesh.errors import MeshError, OptionError
@@ -16,6 +16,7 @@ from anisomesh.mesh import topology
 from anisomesh.mesh.surface import Surface
 from anisomesh.repair.prepare import Prepared, prepare
 from anisomesh.shapes import analytic as shapes
+from conftest import examples
 
 TETRAHEDRON = np.array([[0, 2, 1], [0, 1, 3], [1, 2, 3], [2, 0, 3]])
 
@@ -80,7 +81,7 @@ def soups(draw):
     return Surface(np.array(points, dtype=float), np.array(faces))
 
 
-@settings(deadline=None, max_examples=300)
+@examples(300)
 @given(soups())
 def test_random_soup_becomes_oriented_manifold_sheets(soup):
     try:
@@ -91,7 +92,7 @@ def test_random_soup_becomes_oriented_manifold_sheets(soup):
     check(prepared, soup)
 
 
-@settings(deadline=None, max_examples=60)
+@examples(60)
 @given(st.integers(0, 2**32 - 1), st.floats(0, 1), st.booleans())
 def test_scrambled_closed_surface_comes_back_closed(seed, share, explode):
     rng = np.random.default_rng(seed)

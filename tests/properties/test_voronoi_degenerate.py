@@ -3,13 +3,14 @@
 import naive_rvd as naive
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 
 from anisomesh.mesh.surface import Surface
 from anisomesh.shapes import analytic as shapes
 from anisomesh.voronoi.cells import cells_of
 from anisomesh.voronoi.restricted import RestrictedVoronoi
+from conftest import examples
 
 
 def special_points(surface):
@@ -47,7 +48,7 @@ SHAPES = [
 ]
 
 
-@settings(max_examples=60)
+@examples(60)
 @given(st.sampled_from(SHAPES), st.integers(1, 150), st.integers(0, 2**32))
 def test_special_sites_with_duplicates_give_a_consistent_diagram(surface, n, seed):
     rng = np.random.default_rng(seed)

@@ -3,7 +3,7 @@
 import naive_rvd as naive
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 
 from anisomesh._kernels import integrate
@@ -11,6 +11,7 @@ from anisomesh.errors import OptionError
 from anisomesh.mesh import topology
 from anisomesh.shapes import analytic as shapes
 from anisomesh.voronoi.restricted import RestrictedVoronoi
+from conftest import examples
 
 SHAPES = {
     "sphere": lambda: shapes.sphere(1),
@@ -65,7 +66,7 @@ def test_polygons_partition_every_facet_and_are_nearest_to_their_site(shape, dim
     assert_nearest(diagram, np.random.default_rng(1))
 
 
-@settings(max_examples=15)
+@examples(15)
 @given(
     st.sampled_from(sorted(SHAPES)),
     st.sampled_from([3, 6, 8]),
@@ -157,7 +158,7 @@ def test_result_does_not_depend_on_the_number_of_threads(dimension, n):
         assert_same(diagram, results[0][1])
 
 
-@settings(max_examples=10)
+@examples(10)
 @given(st.lists(st.tuples(st.sampled_from([20, 300]), st.floats(-4, 0)), max_size=4), st.integers(0, 2**32))
 def test_history_changes_nothing_but_rounding(history, seed):
     points, faces, sites = make("torus", 6, 300, seed)
@@ -212,7 +213,7 @@ def test_clustered_sites(dimension, scale):
     assert_nearest(diagram, rng)
 
 
-@settings(max_examples=25)
+@examples(25)
 @given(st.integers(0, 2**32), st.sampled_from([3, 6, 8]), st.integers(100, 400))
 def test_sites_at_all_scales_around_one_point(seed, dimension, n):
     # Regression: as above.

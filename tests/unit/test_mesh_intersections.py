@@ -5,13 +5,14 @@ from fractions import Fraction
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 
 from anisomesh._kernels import orientation
 from anisomesh.mesh.intersections import self_intersections
 from anisomesh.mesh.surface import Surface
 from anisomesh.shapes.analytic import box, cylinder, open_patch, sphere, torus
+from conftest import examples
 
 
 def minus(a, b):
@@ -119,21 +120,21 @@ def shrink(points):
     return points @ rotation(1).T * 1e-9
 
 
-@settings(max_examples=60)
+@examples(60)
 @given(soups())
 def test_pairs_on_a_grid_are_those_of_rational_arithmetic(soup):
     assert self_intersections(soup).tolist() == naive_pairs(soup)
 
 
 @pytest.mark.parametrize("image", [shift, turn, shear, shrink])
-@settings(max_examples=20)
+@examples(20)
 @given(soup=soups(tops=(2, 5)))
 def test_pairs_within_a_rounding_error_of_touching_are_exact(image, soup):
     soup = soup.with_points(image(soup.points))
     assert self_intersections(soup).tolist() == naive_pairs(soup)
 
 
-@settings(max_examples=20)
+@examples(20)
 @given(st.integers(0, 2**32 - 1), st.sampled_from([0.0, 1e6]))
 def test_pairs_among_long_thin_oblique_triangles_are_exact(seed, offset):
     rng = np.random.default_rng(seed)
@@ -144,7 +145,7 @@ def test_pairs_among_long_thin_oblique_triangles_are_exact(seed, offset):
     assert self_intersections(soup).tolist() == naive_pairs(soup)
 
 
-@settings(max_examples=50)
+@examples(50)
 @given(soups(), st.randoms(use_true_random=False), st.sampled_from([-1000, -60, -1, 7, 1000]))
 def test_pairs_do_not_depend_on_order_scale_or_axes(soup, random, exponent):
     pairs = self_intersections(soup)
@@ -294,7 +295,7 @@ def determinant(a, b, c, d):
     return dot(minus(a, d), cross(minus(b, d), minus(c, d)))
 
 
-@settings(max_examples=500)
+@examples(500)
 @given(st.lists(st.tuples(coordinates, coordinates, coordinates), min_size=4, max_size=4))
 def test_orientations_are_exact(points):
     a, b, c, d = points

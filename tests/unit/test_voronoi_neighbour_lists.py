@@ -2,11 +2,12 @@
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 
 from anisomesh.voronoi.neighbour_lists import NeighbourLists
 from anisomesh.voronoi.threads import Workers
+from conftest import examples
 
 
 def assert_lists_hold(table, sites):
@@ -24,7 +25,7 @@ def assert_lists_hold(table, sites):
         assert set(near.tolist()) - {site} <= set(listed.tolist())
 
 
-@settings(max_examples=25)
+@examples(25)
 @given(
     st.integers(1, 120),
     st.sampled_from([1, 2, 3, 8]),
