@@ -36,10 +36,10 @@ def measured(surface: Surface, kind: str) -> dict[str, Any]:
     """Return the seconds of a metric and of its embedding, peak memory, and the mean stretch, in this process."""
     unit = surface.with_points(unit_frame(surface.points).to_unit(surface.points))
     small = make_shape("ring:1000")  # what is loaded and compiled once
-    embed(small, predict(small).tensors if kind == "neural" else compute_metric(small).tensors)
+    embed(small, predict(small).tensors if kind == "neural" else compute_metric(small))
     before = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss
     start = time.perf_counter()
-    tensors = predict(unit, denoise=False).tensors if kind == "neural" else compute_metric(unit).tensors
+    tensors = predict(unit, denoise=False).tensors if kind == "neural" else compute_metric(unit)
     middle = time.perf_counter()
     peak = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss
     embedding = embed(unit, tensors, max_iterations=STEPS)

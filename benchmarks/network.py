@@ -92,7 +92,7 @@ def networks(surface: Surface) -> list[tuple[str, float]]:
 
 
 def embeddings(surface: Surface) -> list[tuple[str, float]]:
-    tensors = compute_metric(surface).tensors
+    tensors = compute_metric(surface)
     found = predict(surface)
     assert found.noise == 0.0
     rows = [("curvature metric", best(lambda: compute_metric(surface)))]

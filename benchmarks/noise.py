@@ -19,8 +19,9 @@ from anisomesh.learn.data.recipe import Recipe
 from anisomesh.mesh.closest_points import ClosestPoints
 from anisomesh.mesh.distance import surface_distance
 from anisomesh.mesh.noise import with_noise
-from anisomesh.metric.quality import anisotropic_quality, transfer_metric_roots
+from anisomesh.metric.quality import anisotropic_quality
 from anisomesh.metric.tensors import metric_root
+from anisomesh.metric.transfer import transfer_metric_roots
 from anisomesh.shapes.implicit import Blobs
 
 FIRST_SEED = 1_000  # the data sets for training start at 0

@@ -52,7 +52,7 @@ class TimedVoronoi(RestrictedVoronoi):
 def evaluation(n: int, iterations: int = 100) -> tuple[float, float, int]:
     """Return mean seconds of an evaluation, median seconds of a query of 20 neighbours, facets."""
     surface = ring(n)
-    embedding = embed(surface, compute_metric(surface).tensors)
+    embedding = embed(surface, compute_metric(surface))
     voronoi = TimedVoronoi(embedding.points, surface.faces, threads=2)
     voronoi.seconds = []
     rng = np.random.default_rng(0)
@@ -72,7 +72,7 @@ def evaluation(n: int, iterations: int = 100) -> tuple[float, float, int]:
 def embedding_time(n: int) -> float:
     """Return median seconds of the embedding without the estimate of the curvature."""
     surface = ring(n)
-    tensors = compute_metric(surface).tensors
+    tensors = compute_metric(surface)
     times = []
     for _ in range(5):
         start = time.perf_counter()
@@ -121,7 +121,7 @@ if {whole}:  # in a process of its own: memory that is free again hides a peak
     print(f"{{peak_above(lambda: remesh(surface, ratio=1.0, max_iterations=8))[0]:.0f}}")
     sys.exit()
 stages = []
-used, embedding = peak_above(lambda: embed(surface, compute_metric(surface).tensors))
+used, embedding = peak_above(lambda: embed(surface, compute_metric(surface)))
 stages.append(("metric and embedding", used))
 voronoi = RestrictedVoronoi(embedding.points, surface.faces)
 sites = sample_surface(voronoi.points, voronoi.faces, voronoi.facets.area, {n}, np.random.default_rng(0))

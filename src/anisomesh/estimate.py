@@ -96,7 +96,7 @@ def estimated(
         wanted = split.interpolate(wanted)
     kind = chosen_embedding(options)
     if kind == "direct":
-        return Estimate(plain=plain, working=working, tensors=compute_metric(working, wanted).tensors, kind=kind)
+        return Estimate(plain=plain, working=working, tensors=compute_metric(working, wanted), kind=kind)
     require_torch()
     from anisomesh.learn.inference.predict import predict
 

@@ -3,7 +3,8 @@
 import numpy as np
 from scipy.spatial.transform import Rotation
 
-from anisomesh.metric.tangent import line_directions, line_field, one_ring_average, tangent_frames, unit_normals
+from anisomesh.metric.line_field import directions_of_line_field, line_field_of_directions, one_ring_averages
+from anisomesh.metric.tangent import tangent_frames, unit_normals
 from anisomesh.shapes.analytic import ellipsoid
 
 SURFACE = ellipsoid((1.0, 0.5, 0.3), 1)
@@ -26,8 +27,8 @@ def test_averages_are_those_of_the_rotated_neighbours():
     angle = rng.uniform(0, 2 * np.pi, SURFACE.n_points)
     lines = np.cos(angle)[:, None] * frames[:, 0] + np.sin(angle)[:, None] * frames[:, 1]
     size, scalar = rng.uniform(1, 2, SURFACE.n_points), rng.standard_normal(SURFACE.n_points)
-    scalar_average, line_average = one_ring_average(SURFACE, normals, frames)
-    found, found_scalar = line_average @ line_field(lines, size, frames), scalar_average @ scalar
+    scalar_average, line_average = one_ring_averages(SURFACE, normals, frames)
+    found, found_scalar = line_average @ line_field_of_directions(lines, size, frames), scalar_average @ scalar
     for i in range(SURFACE.n_points):
         weight, tensor, total = 1.0, size[i] * np.outer(lines[i], lines[i]), scalar[i]
         for j in neighbours(i):
@@ -38,7 +39,7 @@ def test_averages_are_those_of_the_rotated_neighbours():
             total += cosine * scalar[j]
         low, high = np.linalg.eigvalsh(tensor / weight)[1:]
         np.testing.assert_allclose(abs(found[i]), high - low, atol=1e-12)
-        direction = line_directions(found, frames)[i]
+        direction = directions_of_line_field(found, frames)[i]
         np.testing.assert_allclose(direction @ tensor @ direction / weight, high, atol=1e-12)
         np.testing.assert_allclose(found_scalar[i], total / weight)
 
@@ -49,8 +50,10 @@ def test_lines_forget_their_sign_and_keep_their_direction():
     lines = np.einsum("vx,vkx,vky->vy", lines, frames, frames)
     lines /= np.linalg.norm(lines, axis=1)[:, None]
     ones = np.ones(SURFACE.n_points)
-    np.testing.assert_allclose(line_field(-lines, ones, frames), line_field(lines, ones, frames), atol=1e-12)
-    back = line_directions(line_field(lines, ones, frames), frames)
+    np.testing.assert_allclose(
+        line_field_of_directions(-lines, ones, frames), line_field_of_directions(lines, ones, frames), atol=1e-12
+    )
+    back = directions_of_line_field(line_field_of_directions(lines, ones, frames), frames)
     np.testing.assert_allclose(np.abs(np.einsum("vx,vx->v", back, lines)), 1.0)
 
 

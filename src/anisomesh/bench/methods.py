@@ -96,7 +96,7 @@ def _mmg_with_metric(surface: Surface, n: int, seed: int, options: dict[str, Any
 
     frame = unit_frame(surface.points)
     unit = surface.with_points(frame.to_unit(surface.points))
-    tensors = compute_metric(unit, options.get("metric", "curvature")).tensors
+    tensors = compute_metric(unit, options.get("metric", "curvature"))
     upper = np.ascontiguousarray(tensors[:, [0, 0, 0, 1, 1, 2], [0, 1, 2, 1, 2, 2]])
 
     def settings(size: float, mesh: Any) -> dict[str, Any]:

@@ -26,7 +26,7 @@ from anisomesh.meshops.flip import flip_for_shape
 from anisomesh.meshops.self_intersections import separate
 from anisomesh.meshops.split import grow
 from anisomesh.meshops.untangle import untangle
-from anisomesh.metric.quality import transfer_metric_roots
+from anisomesh.metric.transfer import transfer_metric_roots
 from anisomesh.metric.tensors import metric_root
 from anisomesh.voronoi.cells import Cells, cells_of
 from anisomesh.voronoi.diagram import Diagram

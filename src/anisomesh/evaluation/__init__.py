@@ -1,1 +1,1 @@
-"""Measures of a remesh: shape of the triangles, validity, distance to the input."""
+"""Measures of a remesh: triangle shapes, validity, distances to the input, preserved features."""

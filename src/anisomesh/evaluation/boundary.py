@@ -1,4 +1,4 @@
-"""How far the boundary curves of a remesh are from those of its reference."""
+"""Distances between the boundaries of a remesh and its reference."""
 
 from __future__ import annotations
 
@@ -12,20 +12,21 @@ import numpy.typing as npt
 from anisomesh.features.detect import points_along
 from anisomesh.mesh.surface import Surface
 
-_FINENESS = 1e-4  # of the diagonal of the reference between sample points
-_MOST_POINTS = 1_000_000
+_BOUNDARY_SPACING = 1e-4  # between sample points, over the diagonal of the reference; below errors of interest
+_MAX_BOUNDARY_SAMPLES = 1_000_000  # bounds the memory for long boundaries
 
 
 @dataclass(frozen=True, kw_only=True)
 class BoundaryDistance:
-    """Distances between the boundary curves of two surfaces, in their units.
+    """Distances between the boundaries of two surfaces a and b, in units of the surfaces.
 
     Attributes
     ----------
     mean_ab, mean_ba
-        Mean distance of the curves of the first from those of the second, by length, and the other way.
+        Mean distance, by length, from the boundary of a to that of b, and from b to a.
     max_ab, max_ba
-        The same for the largest distance.
+        Largest distance from the boundary of a to that of b, and from b to a (lower bounds of the one-sided Hausdorff
+        distances).
     """
 
     mean_ab: float
@@ -39,10 +40,10 @@ class BoundaryDistance:
 
 
 def boundary_distance(a: Surface, b: Surface) -> BoundaryDistance | None:
-    """Return the distances between the boundary curves, None where one of the surfaces is closed.
+    """Return the distances between the boundaries of two surfaces, or None if one of them is closed.
 
-    The distance is taken exactly from points at 1e-4 of the diagonal of ``a`` along the one boundary, with all its
-    vertices, to the segments of the other.
+    Distances go from points on one boundary, at most 1e-4 of the diagonal of ``a`` apart and with all its vertices, to
+    the closest points on the segments of the other. The measure is defined here, not in the paper.
     """
     if not (a.on_boundary.any() and b.on_boundary.any()):
         return None
@@ -53,10 +54,11 @@ def boundary_distance(a: Surface, b: Surface) -> BoundaryDistance | None:
 
 
 def _distances(a: Surface, b: Surface, diagonal: float) -> npt.NDArray[np.float64]:
-    rim, other = a.edge_face_count == 1, b.edges[b.edge_face_count == 1].astype(np.int64)
-    spacing = max(_FINENESS * diagonal, float(a.edge_lengths[rim].sum()) / _MOST_POINTS)
+    """Return the distances (n,) of points along the boundary of a from the boundary of b."""
+    boundary, other = a.edge_face_count == 1, b.edges[b.edge_face_count == 1].astype(np.int64)
+    spacing = max(_BOUNDARY_SPACING * diagonal, float(a.edge_lengths[boundary].sum()) / _MAX_BOUNDARY_SAMPLES)
     tree = igl.AABB()
     tree.init(b.points, other)
-    queries = np.ascontiguousarray(points_along(a, rim, spacing or 1.0))
+    queries = np.ascontiguousarray(points_along(a, boundary, spacing or 1.0))
     squared = tree.squared_distance(b.points, other, queries)[0]
     return np.asarray(np.sqrt(squared), dtype=np.float64)

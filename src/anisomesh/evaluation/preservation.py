@@ -1,4 +1,4 @@
-"""How much of the creases and corners of a surface a remesh has kept."""
+"""Preservation of the creases and corners of a surface by a remesh."""
 
 from __future__ import annotations
 
@@ -8,27 +8,30 @@ from typing import Any
 import numpy as np
 from scipy.spatial import cKDTree
 
+from anisomesh._arrays import EdgeMask
 from anisomesh.errors import OptionError
 from anisomesh.features.detect import corners, points_along, sharp_edges
 from anisomesh.mesh.surface import Surface
 
-DEFAULT_TOLERANCE = 0.004
-_FINENESS = 10  # points on creases per tolerance
-_MOST_POINTS = 2_000_000  # in all, for tiny tolerances
+FEATURE_TOLERANCE = 0.004  # length at bounding-box diagonal 1: the distance of the paper's F1
+
+_SAMPLES_PER_TOLERANCE = 10  # points per length: distances between creases are off by less than 1 % of the tolerance
+_MAX_CREASE_SAMPLES = 2_000_000  # bounds the memory for small tolerances
+_MIN_RESULT_ANGLE = 0.5  # fraction of the crease angle: a chord of a curved crease has a smaller dihedral angle
 
 
 @dataclass(frozen=True, kw_only=True)
 class FeaturePreservation:
-    """Creases and corners of a reference that a remesh has.
+    """Creases and corners of a reference that a remesh preserves.
 
     Attributes
     ----------
     crease_length
         Total length of the creases of the reference, in its units.
     crease_covered
-        Share of that length within the tolerance of a bent edge of the remesh; 1 if there are no creases.
+        Fraction of this length within the tolerance of a crease of the remesh; 1 if the reference has no creases.
     corners, corners_kept
-        Corners of the reference, and how many have a vertex of the remesh within the tolerance.
+        Number of corners of the reference, and of those with a vertex of the remesh within the tolerance.
     """
 
     crease_length: float
@@ -42,19 +45,19 @@ class FeaturePreservation:
 
 
 def feature_preservation(
-    reference: Surface, result: Surface, *, crease_angle: float = 30.0, tolerance: float = DEFAULT_TOLERANCE
+    reference: Surface, result: Surface, *, crease_angle: float = 30.0, tolerance: float = FEATURE_TOLERANCE
 ) -> FeaturePreservation:
-    """Return how much of the creases and corners of a reference a remesh has.
+    """Return which part of the creases and corners of a reference a remesh preserves.
 
     Parameters
     ----------
     reference, result
         The surface and its remesh, in the same units.
     crease_angle
-        Creases of the reference are edges whose faces differ by more than this many degrees. Edges of the remesh count
-        as bent from half of it on: a chord of a curved crease is less sharp than the crease.
+        Angle in degrees between the normals of two faces above which their edge is a crease of the reference. Half
+        this angle makes a crease of the remesh, as a chord of a curved crease is less sharp than the crease.
     tolerance
-        Distance up to which a crease or corner counts as kept, in the units of the surfaces.
+        Largest distance, in units of the surfaces, at which a crease or corner counts as preserved.
 
     Raises
     ------
@@ -63,8 +66,9 @@ def feature_preservation(
 
     Notes
     -----
-    Corners are points where creases end, meet in numbers other than two, or turn by more than 45 degrees. The distance
-    between creases is taken between points on both at a tenth of the tolerance, so it is off by less than 1 %.
+    See :func:`anisomesh.features.detect.corners` for corners. Distances between creases are taken between points on
+    both, a tenth of the tolerance apart, so they are off by less than 1 % of the tolerance. The measure is defined
+    here; the paper has none for features along their length.
     """
     if not (np.isfinite(tolerance) and tolerance > 0.0):
         raise OptionError(f"tolerance is {tolerance}; expected a positive length")
@@ -73,7 +77,7 @@ def feature_preservation(
     kept = cKDTree(result.points[np.unique(result.faces)]).query(at_corner)[0] <= tolerance
     return FeaturePreservation(
         crease_length=float(reference.edge_lengths[sharp].sum()),
-        crease_covered=_covered(reference, result, sharp, 0.5 * crease_angle, tolerance),
+        crease_covered=_covered(reference, result, sharp, _MIN_RESULT_ANGLE * crease_angle, tolerance),
         corners=len(at_corner),
         corners_kept=int(kept.sum()),
     )
@@ -82,24 +86,24 @@ def feature_preservation(
 def _covered(
     reference: Surface,
     result: Surface,
-    sharp: np.ndarray[tuple[int], np.dtype[np.bool_]],
+    sharp: EdgeMask,
     angle: float,
     tolerance: float,
 ) -> float:
-    """Return the share of the length of the sharp edges that is near a bent edge of the result."""
+    """Return the fraction of the length of the sharp edges within the tolerance of a crease of the result."""
     if not sharp.any():
         return 1.0
-    spacing = max(tolerance / _FINENESS, float(reference.edge_lengths[sharp].sum()) / _MOST_POINTS)
-    bent = points_along(result, sharp_edges(result, angle), spacing)
-    if len(bent) == 0:
+    spacing = max(tolerance / _SAMPLES_PER_TOLERANCE, float(reference.edge_lengths[sharp].sum()) / _MAX_CREASE_SAMPLES)
+    found = points_along(result, sharp_edges(result, angle), spacing)
+    if len(found) == 0:
         return 0.0
-    # every sharp edge in equal pieces, each judged at its middle and weighted by its length
+    # midpoint rule: every sharp edge in equal pieces, each tested at its midpoint and weighted by its length
     ends = reference.points[reference.edges[sharp]]
     length = reference.edge_lengths[sharp]
     count = np.maximum(np.ceil(length / spacing).astype(np.int64), 1)
     which = np.repeat(np.arange(len(count)), count)
-    share = (np.arange(len(which)) - np.repeat(np.cumsum(count) - count, count) + 0.5) / count[which]
-    middles = (1.0 - share)[:, None] * ends[which, 0] + share[:, None] * ends[which, 1]
-    near = cKDTree(bent).query(middles)[0] <= tolerance
+    parameter = (np.arange(len(which)) - np.repeat(np.cumsum(count) - count, count) + 0.5) / count[which]
+    midpoints = (1.0 - parameter)[:, None] * ends[which, 0] + parameter[:, None] * ends[which, 1]
+    near = cKDTree(found).query(midpoints)[0] <= tolerance
     weight = (length / count)[which]
     return float(weight[near].sum() / weight.sum()) if not near.all() else 1.0

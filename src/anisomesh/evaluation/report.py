@@ -1,4 +1,4 @@
-"""Everything that is measured about a remesh, in one report."""
+"""The report of all measures of a remesh."""
 
 from __future__ import annotations
 
@@ -10,37 +10,38 @@ import numpy as np
 from anisomesh.evaluation.boundary import BoundaryDistance, boundary_distance
 from anisomesh.evaluation.preservation import FeaturePreservation, feature_preservation
 from anisomesh.evaluation.sampled import CREASE_ANGLE, DEFAULT_SAMPLES, SampledMeasures, sampled_measures
-from anisomesh.evaluation.shape import ShapeStatistics, shape_statistics
+from anisomesh.evaluation.shape import ShapeStatistics, quality_in_reference_metric, shape_statistics
 from anisomesh.io.convert import as_surface
 from anisomesh.mesh.closest_points import ClosestPoints
 from anisomesh.mesh.distance import SurfaceDistance, surface_distance
 from anisomesh.mesh.geometry import unit_frame
 from anisomesh.mesh.surface import Surface
 from anisomesh.mesh.validity import Validity, check_validity
-from anisomesh.metric.quality import quality_on
 from anisomesh.repair.prepare import prepare
 
 
 @dataclass(frozen=True, kw_only=True)
 class Evaluation:
-    """What is measured about a remesh; lengths at bounding-box diagonal 1 of the reference.
+    """Measures of a remesh; lengths in units in which the bounding-box diagonal of the reference is 1.
 
     Attributes
     ----------
     vertices, faces
         Size of the remesh.
     sampled, floor
-        The paper's measures between samples, and the same of the reference against itself: the least that can be had.
+        The paper's measures between point samples of reference and remesh, and the same between two samples of the
+        reference: no remesh can be expected to have better values.
     distance
-        Exact distances to the other surface, a the reference and b the remesh, on samples, vertices and edge middles.
+        Distances from samples, vertices and edge midpoints of each surface to the other surface; a is the reference,
+        b the remesh.
     vertex_rms, vertex_max
-        Distance of the vertices of the remesh from the reference.
+        Root mean square and maximum of the distances of the vertices of the remesh from the reference.
     shape
-        Triangle quality in the paper's metric of the reference, angles, edge lengths.
+        Quality in the curvature metric of the reference, angles, edge lengths of the triangles.
     features
-        Creases and corners of the reference that the remesh has.
+        Creases and corners of the reference that the remesh preserves.
     boundary
-        Distances between the boundary curves, a the reference and b the remesh; None where one has none.
+        Distances between the boundaries, a of the reference and b of the remesh; None if one of them is closed.
     validity
         Topology, inverted triangles and self-intersections.
     """
@@ -58,7 +59,7 @@ class Evaluation:
     validity: Validity
 
     def as_dict(self) -> dict[str, Any]:
-        """Return everything as nested dictionaries of numbers, for JSON."""
+        """Return all measures as nested dictionaries of numbers, for JSON."""
         return {
             "vertices": self.vertices,
             "faces": self.faces,
@@ -80,32 +81,28 @@ def evaluate(
     crease_angle: float = CREASE_ANGLE,
     seed: int = 0,
 ) -> Evaluation:
-    """Measure how good a remesh of a surface is.
+    """Measure a remesh against the surface that was remeshed.
 
     Parameters
     ----------
     reference
-        The surface that was remeshed: a :class:`Surface`, a ``trimesh.Trimesh`` or a ``pyvista.PolyData``. It is
-        repaired as before a remesh, so that it has an orientation and a topology to compare with.
+        The input surface: a :class:`Surface`, a ``trimesh.Trimesh`` or a ``pyvista.PolyData``. It is repaired as
+        before a remesh, so that it has an orientation and a topology for comparison.
     result
-        The remesh, in the same units and place; it is measured as it is.
+        The remesh, of the same types and in the same coordinates; it is measured without repair.
     samples
-        Points drawn on each surface.
+        Number of points drawn on each surface.
     crease_angle
-        Creases of the reference are edges whose faces differ by more than this many degrees.
+        Dihedral angle in degrees, between the normals, above which edges of the reference are creases.
     seed
-        Of the samples: the same seed gives the same figures.
+        Seed of the samples; equal seeds give equal results.
 
     Raises
     ------
     MeshError
-        If one of the two is no mesh, or nothing of the reference is left after the repair.
+        If one of the two is not a mesh, or the repaired reference is empty.
     OptionError
-        If there is no sample.
-
-    Notes
-    -----
-    The metric of the shape statistics is the paper's, of the reference, taken at the closest point of each vertex.
+        If ``samples`` is below 1.
 
     References
     ----------
@@ -114,8 +111,8 @@ def evaluate(
     repaired = prepare(as_surface(reference)).surface
     frame = unit_frame(repaired.points)
     a = repaired.with_points(frame.to_unit(repaired.points))
-    given = as_surface(result)
-    b = Surface(frame.to_unit(given.points), given.faces)
+    remeshed = as_surface(result)
+    b = Surface(frame.to_unit(remeshed.points), remeshed.faces)
     closest = ClosestPoints(a)
     squared = closest.squared_distances(b.points[np.unique(b.faces)])
     rng = np.random.default_rng(seed)
@@ -127,7 +124,7 @@ def evaluate(
         distance=surface_distance(a, b, samples=samples, seed=rng),
         vertex_rms=float(np.sqrt(squared.mean())),
         vertex_max=float(np.sqrt(squared.max())),
-        shape=shape_statistics(b, quality_on(closest, b)),
+        shape=shape_statistics(b, quality_in_reference_metric(closest, b)),
         features=feature_preservation(a, b, crease_angle=crease_angle),
         boundary=boundary_distance(a, b),
         validity=check_validity(b, a),

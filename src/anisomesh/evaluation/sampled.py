@@ -1,4 +1,4 @@
-"""The paper's measures: distances between point samples of two surfaces, which have a floor above zero."""
+"""The measures of the paper, between point samples of two surfaces; equal surfaces have values above zero."""
 
 from __future__ import annotations
 
@@ -13,29 +13,30 @@ from anisomesh.features.detect import sharp_edges
 from anisomesh.mesh.sampling import points_on_edges, points_on_faces
 from anisomesh.mesh.surface import Surface
 
-DEFAULT_SAMPLES = 100_000
-F1_DISTANCE = 0.004  # of the paper, at bounding-box diagonal 1
-WIDE_F1_DISTANCE = 0.005
-CREASE_ANGLE = 30.0  # degrees
+DEFAULT_SAMPLES = 100_000  # points on each surface; NASM, section 4.1
+CREASE_ANGLE = 30.0  # degrees between face normals; NASM, section 4.1
+
+_F1_DISTANCE = 0.004  # threshold of F1 and EF1 at bounding-box diagonal 1; NASM, section 4.1
+_WIDE_F1_DISTANCE = 0.005  # second threshold of EF1, at bounding-box diagonal 1; a common choice
 
 
 @dataclass(frozen=True, kw_only=True)
 class SampledMeasures:
-    """Measures between samples of two surfaces a and b; lengths in units of the surfaces.
+    """Measures between point samples of two surfaces a and b; lengths in units of the surfaces.
 
     Attributes
     ----------
     chamfer
-        CD: mean squared distance to the nearest sample of the other surface, sum of both directions.
+        CD: mean squared distance to the nearest sample of the other surface, sum of both directions, length^2.
     f1
-        F1: harmonic mean of the shares of samples nearer than 0.004 to the other's samples.
+        F1: harmonic mean of the fractions of samples of a and of b nearer than 0.004 to a sample of the other.
     normal_consistency
-        NC: mean of ``|n . n'|`` over nearest samples, average of both directions.
+        NC: mean of ``|n . n'|`` over pairs of nearest samples, average of both directions.
     hausdorff
-        HD: largest distance to the nearest sample of the other surface, either way.
+        HD: largest distance to the nearest sample of the other surface, maximum of both directions.
     edge_chamfer, edge_f1, edge_f1_wide
-        ECD, EF1 and EF1 at 0.005: the same for samples of the creases. If neither surface has a crease they are 0, 1
-        and 1; if only one has, EF1 is 0 and ECD is not defined (None).
+        ECD, EF1 and EF1 with 0.005 in place of 0.004: CD and F1 of samples of the creases. If neither surface has a
+        crease: 0, 1 and 1. If only one has: None (not defined), 0 and 0.
     """
 
     chamfer: float
@@ -59,28 +60,28 @@ def sampled_measures(
     crease_angle: float = CREASE_ANGLE,
     seed: int | np.random.Generator = 0,
 ) -> SampledMeasures:
-    """Return the paper's measures between two surfaces.
+    """Return the measures of the paper between two surfaces.
 
     Parameters
     ----------
     a, b
-        The surfaces, in units in which the bounding-box diagonal of the reference is 1.
+        The surfaces, scaled so that the bounding-box diagonal of the reference is 1.
     samples
         Number of points on each surface, uniform by area, and on the creases of each, uniform by length.
     crease_angle
-        Creases are edges whose faces differ by more than this many degrees.
+        Angle in degrees between the normals of two faces above which their edge is a crease.
     seed
-        Seed or generator of the samples; the same seed gives the same result.
+        Seed or generator of the samples; equal seeds give equal results.
 
     Raises
     ------
     OptionError
-        If there is no sample.
+        If ``samples`` is below 1.
 
     Notes
     -----
-    Two independent samples of the same surface of area A, N points each, have CD = 2 A / (pi N), F1 = 1 - exp(-pi r^2
-    N / A) and HD of about sqrt(A log N / (pi N)): no result can be better. ``sampled_measures(a, a)`` gives this floor.
+    Two independent samples of one surface of area A, N points each, have expected values CD = 2 A / (pi N), F1 = 1 -
+    exp(-pi r^2 N / A) and HD of about sqrt(A log N / (pi N)). ``sampled_measures(a, a)`` measures this floor.
 
     References
     ----------
@@ -95,10 +96,10 @@ def sampled_measures(
     ba, nearest_a = cKDTree(points_a).query(points_b, workers=-1)
     agreement_a = np.abs(np.einsum("nx,nx->n", normals_a, normals_b[nearest_b])).mean()
     agreement_b = np.abs(np.einsum("nx,nx->n", normals_b, normals_a[nearest_a])).mean()
-    edge_chamfer, edge_f1, edge_f1_wide = _of_creases(a, b, samples, crease_angle, rng)
+    edge_chamfer, edge_f1, edge_f1_wide = _crease_measures(a, b, samples, crease_angle, rng)
     return SampledMeasures(
         chamfer=_chamfer(ab, ba),
-        f1=_f1(ab, ba, F1_DISTANCE),
+        f1=_f1(ab, ba, _F1_DISTANCE),
         normal_consistency=float(0.5 * (agreement_a + agreement_b)),
         hausdorff=float(max(ab.max(), ba.max())),
         edge_chamfer=edge_chamfer,
@@ -107,9 +108,10 @@ def sampled_measures(
     )
 
 
-def _of_creases(
+def _crease_measures(
     a: Surface, b: Surface, samples: int, angle: float, rng: np.random.Generator
 ) -> tuple[float | None, float, float]:
+    """Return CD, F1 and F1 at the wide distance of samples of the creases, by the rules of SampledMeasures."""
     points_a, points_b = (points_on_edges(surface, sharp_edges(surface, angle), samples, rng) for surface in (a, b))
     if len(points_a) == 0 and len(points_b) == 0:
         return 0.0, 1.0, 1.0
@@ -117,13 +119,15 @@ def _of_creases(
         return None, 0.0, 0.0
     ab = cKDTree(points_b).query(points_a, workers=-1)[0]
     ba = cKDTree(points_a).query(points_b, workers=-1)[0]
-    return _chamfer(ab, ba), _f1(ab, ba, F1_DISTANCE), _f1(ab, ba, WIDE_F1_DISTANCE)
+    return _chamfer(ab, ba), _f1(ab, ba, _F1_DISTANCE), _f1(ab, ba, _WIDE_F1_DISTANCE)
 
 
 def _chamfer(ab: Floats, ba: Floats) -> float:
+    """Return the chamfer distance of nearest distances of a (n,) and of b (m,)."""
     return float((ab**2).mean() + (ba**2).mean())
 
 
 def _f1(ab: Floats, ba: Floats, distance: float) -> float:
+    """Return the F1 score of nearest distances of a (n,) and of b (m,); 0 if all are at least the threshold."""
     recall, precision = float((ab < distance).mean()), float((ba < distance).mean())
     return 2.0 * precision * recall / (precision + recall) if precision + recall > 0.0 else 0.0

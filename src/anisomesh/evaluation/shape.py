@@ -1,4 +1,4 @@
-"""Statistics of the triangles of a mesh: quality in the metric, angles, edge lengths."""
+"""Statistics of the triangles of a mesh: quality in a metric, angles, edge lengths."""
 
 from __future__ import annotations
 
@@ -8,24 +8,31 @@ from typing import Any
 import numpy as np
 
 from anisomesh._arrays import FaceScalars
+from anisomesh.mesh.closest_points import ClosestPoints
 from anisomesh.mesh.geometry import corner_angles
 from anisomesh.mesh.surface import Surface
+from anisomesh.metric.quality import anisotropic_quality
+from anisomesh.metric.tensors import compute_metric, metric_root
+from anisomesh.metric.transfer import transfer_metric_roots
+
+_LOW_QUANTILE = 0.05  # of g_low and angle_low; a convention of this report
 
 
 @dataclass(frozen=True, kw_only=True)
 class ShapeStatistics:
-    """Shapes of triangles.
+    """Shapes of the triangles of a mesh.
 
     Attributes
     ----------
     g_mean, g_min, g_low
-        Mean, minimum and 5 % quantile of the quality G in the metric, 1 for an equilateral triangle.
+        Mean (the paper's G_avg), minimum and 5 % quantile of the anisotropic quality G, dimensionless: 1 if
+        equilateral in the metric, 0 if degenerate.
     angle_min, angle_low, angle_max
-        Smallest angle, 5 % quantile of the smallest angles of the triangles, and largest angle, in degrees in space.
+        Smallest angle, 5 % quantile of the smallest angles of the triangles, and largest angle, in degrees, Euclidean.
     edge_min, edge_mean, edge_max
-        Edge lengths in space, in the units of the mesh.
+        Euclidean edge lengths, in units of the mesh.
     edge_variation
-        Standard deviation of the edge lengths over their mean.
+        Standard deviation of the edge lengths divided by their mean; 0 if the mean is 0.
     """
 
     g_mean: float
@@ -44,12 +51,29 @@ class ShapeStatistics:
         return asdict(self)
 
 
-def shape_statistics(surface: Surface, quality: FaceScalars) -> ShapeStatistics:
-    """Return the statistics of a mesh whose triangles have these qualities G (F,).
+def quality_in_reference_metric(reference: ClosestPoints, surface: Surface) -> FaceScalars:
+    """Return the quality G (F,) of the triangles of a remesh in the curvature metric of its reference.
 
-    Notes
-    -----
-    A triangle without area has G = 0 and its angles count as they are, 0 and 180 degrees.
+    Parameters
+    ----------
+    reference
+        Search tree of the reference, at bounding-box diagonal 1. Each vertex of the remesh takes the metric of its
+        closest point.
+    surface
+        The remesh, in the coordinates of the reference.
+
+    References
+    ----------
+    NASM, section 4.1; see :func:`anisomesh.metric.quality.anisotropic_quality`.
+    """
+    roots = metric_root(compute_metric(reference.surface))
+    return anisotropic_quality(surface.points, surface.faces, transfer_metric_roots(reference, roots, surface.points))
+
+
+def shape_statistics(surface: Surface, quality: FaceScalars) -> ShapeStatistics:
+    """Return the shape statistics of a mesh from the qualities G (F,) of its triangles.
+
+    A degenerate triangle has G = 0 and counts with its angles of 0 and 180 degrees.
     """
     angles = np.degrees(corner_angles(surface.points[surface.faces]))
     lengths = surface.edge_lengths
@@ -57,9 +81,9 @@ def shape_statistics(surface: Surface, quality: FaceScalars) -> ShapeStatistics:
     return ShapeStatistics(
         g_mean=float(quality.mean()),
         g_min=float(quality.min()),
-        g_low=float(np.quantile(quality, 0.05)),
+        g_low=float(np.quantile(quality, _LOW_QUANTILE)),
         angle_min=float(angles.min()),
-        angle_low=float(np.quantile(angles.min(axis=1), 0.05)),
+        angle_low=float(np.quantile(angles.min(axis=1), _LOW_QUANTILE)),
         angle_max=float(angles.max()),
         edge_min=float(lengths.min()),
         edge_mean=mean,

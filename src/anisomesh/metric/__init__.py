@@ -1,1 +1,1 @@
-"""Principal curvatures and the metric tensors made of them."""
+"""Principal curvatures, metric tensors, line fields, and quality and transfer of a metric."""

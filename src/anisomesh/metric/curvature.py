@@ -9,36 +9,36 @@ import numpy as np
 import numpy.typing as npt
 from scipy import sparse
 
-from anisomesh._arrays import Edges, Faces, PointMask, PointVectors
+from anisomesh._arrays import Edges, Faces, PointMask, PointScalars, PointVectors
 from anisomesh.errors import OptionError
 from anisomesh.mesh.geometry import unit
 from anisomesh.mesh.surface import Surface
 from anisomesh.mesh.topology import connected_components, edges_of
 from anisomesh.metric.tangent import tangent_frames, unit_normals
 
-_NEEDLE = 1e-6
-_CANCELLED = 1e-5
-_UNCLEAR = 0.1
-_CHUNK = 1024
-_TANGENT = 0.1
-_FLAT = 1e-3
+_MIN_FIT_HEIGHT = 1e-6  # height over longest side of the faces that libigl may see; heuristic
+_MIN_SAFE_NORMAL = 1e-5  # mean unit normal of a ring: libigl ends the process at 0; far above rounding, 1e-16
+_MIN_RELIABLE_NORMAL = 0.1  # mean unit normal of a ring below which its fit is arbitrary; heuristic
+_MIN_TANGENT_PART = 0.1  # length of a fitted unit direction in the tangent plane, sine of the angle; heuristic
+_MAX_FLAT_CURVATURE = 1e-3  # curvature times bounding-box diagonal; heuristic, a thousandth of the lower limit
+_RING_BLOCK = 1024  # points at once, to bound the memory of their rings
 
 PointPairs = npt.NDArray[np.float64]
+"""Two values at each point (V, 2)."""
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
-class Curvature:
-    """Principal curvatures at the points.
+class PrincipalCurvatures:
+    """Principal curvatures and directions at the points.
 
     Attributes
     ----------
     values
-        Signed curvatures (V, 2) in 1/length, the one of smaller magnitude first; positive where the surface
-        bends away from its normal (a sphere with outward normals).
+        Signed curvatures (V, 2) in 1/length, smaller magnitude first; positive for a sphere with outward normals.
     directions
         Unit tangent vectors (V, 2, 3) in the same order; their signs are arbitrary.
     trusted
-        False (V,) where the neighbourhood was too small or too degenerate for a fit.
+        False (V,) where the neighbourhood is too small or too degenerate for a fit.
     """
 
     values: npt.NDArray[np.float64]
@@ -46,8 +46,8 @@ class Curvature:
     trusted: PointMask
 
 
-def principal_curvatures(surface: Surface, *, radius: int = 5) -> Curvature:
-    """Return the principal curvatures from quadrics fitted to the neighbourhoods.
+def principal_curvatures(surface: Surface, *, radius: int = 5) -> PrincipalCurvatures:
+    """Return the principal curvatures of quadrics fitted to neighbourhoods of the points.
 
     Parameters
     ----------
@@ -63,14 +63,14 @@ def principal_curvatures(surface: Surface, *, radius: int = 5) -> Curvature:
 
     Notes
     -----
-    libigl fits a quadric over the ``radius``-ring, in a frame along the sum of the normals there; its error falls
-    with the square of the edge length. When that sum vanishes or is not a number, libigl reads out of bounds and
-    can end the process, so it does not see needle-like faces, nor a component in which the normals of some ring
-    cancel (such as a cube of 8 points, or sheets that are not oriented). Where fewer than six points are in reach,
-    or the normals nearly cancel, the shape operator is integrated from the normal curvatures of the edges at the
-    point (Taubin), and ``trusted`` is False. Points without faces have curvature 0. The fit gives no direction
-    where a mesh is flat; the rough estimate must then agree for the point to be trusted. Directions are projected
-    to the plane of the point normal. About 0.1 s for 6,000 points.
+    libigl fits a quadric over the ``radius``-ring, in a frame along the sum of the normals there; the error falls
+    with the square of the edge length. If the sum vanishes or is not a number, libigl reads out of bounds and can end
+    the process, so it is given neither needle-like faces nor components in which the normals of some ring cancel (a
+    cube of 8 points, parts without consistent orientation). Where fewer than six points are in the ring, or the
+    normals nearly cancel, the shape operator is integrated from the normal curvatures of the edges at the point
+    (Taubin), and ``trusted`` is False. Points without faces have curvature 0. On flat parts the fit has no direction;
+    the point is trusted if Taubin's estimate is flat as well. Directions are projected to the tangent plane of the
+    point normal. About 0.1 s for 6,000 points.
 
     References
     ----------
@@ -80,25 +80,26 @@ def principal_curvatures(surface: Surface, *, radius: int = 5) -> Curvature:
     if radius < 2:
         raise OptionError(f"radius of the curvature fit is {radius}; expected at least 2 rings of edges")
     normals = unit_normals(surface)
-    values, steepest = _fitted(surface, radius, normals)
+    values, steepest = _quadric_curvatures(surface, radius, normals)
     fitted: PointMask = np.asarray(np.isfinite(values).all(axis=1) & surface.point_normals.any(axis=1))
-    clear: PointMask = np.asarray(fitted & steepest.any(axis=1))
-    trusted = clear
-    if not clear.all():
-        rough_values, rough_steepest = _integrated(surface, normals)
-        trusted = np.asarray(clear | (fitted & (np.abs(rough_values[:, 1]) * surface.diagonal < _FLAT)))
-        values = np.where(clear[:, None], values, rough_values)
-        steepest = np.where(clear[:, None], steepest, rough_steepest)
-    return Curvature(
+    directed: PointMask = np.asarray(fitted & steepest.any(axis=1))
+    trusted = directed
+    if not directed.all():
+        rough_values, rough_steepest = _taubin_curvatures(surface, normals)
+        flat = np.abs(rough_values[:, 1]) * surface.diagonal < _MAX_FLAT_CURVATURE
+        trusted = np.asarray(directed | (fitted & flat))
+        values = np.where(directed[:, None], values, rough_values)
+        steepest = np.where(directed[:, None], steepest, rough_steepest)
+    return PrincipalCurvatures(
         values=values, directions=np.stack([np.cross(normals, steepest), steepest], axis=1), trusted=trusted
     )
 
 
-def _fitted(surface: Surface, radius: int, normals: PointVectors) -> tuple[PointPairs, PointVectors]:
-    """Return the curvatures sorted by magnitude (NaN without a fit) and the direction of the larger one, or zero."""
+def _quadric_curvatures(surface: Surface, radius: int, normals: PointVectors) -> tuple[PointPairs, PointVectors]:
+    """Return curvatures sorted by magnitude (NaN without a fit) and the direction of the larger (zero without one)."""
     values = np.full((surface.n_points, 2), np.nan)
     steepest = np.zeros((surface.n_points, 3))
-    faces, unclear = _fit_faces(surface, radius)
+    faces, unreliable = _faces_to_fit(surface, radius)
     if len(faces):
         used, local = np.unique(faces, return_inverse=True)
         along_1, along_2, k1, k2, starved = igl.principal_curvature(
@@ -108,49 +109,49 @@ def _fitted(surface: Surface, radius: int, normals: PointVectors) -> tuple[Point
         values[used] = np.where(second[:, None], np.stack([k1, k2], axis=1), np.stack([k2, k1], axis=1))
         steepest[used] = np.where(second[:, None], along_2, along_1)
         values[used[np.asarray(starved, dtype=np.int64)]] = np.nan
-        values[unclear] = np.nan
+        values[unreliable] = np.nan
     steepest = steepest - np.einsum("vx,vx->v", steepest, normals)[:, None] * normals
-    clear = np.isfinite(values).all(axis=1) & (np.linalg.norm(steepest, axis=1) > _TANGENT)
-    return values, unit(np.where(clear[:, None], steepest, 0.0))
+    directed = np.isfinite(values).all(axis=1) & (np.linalg.norm(steepest, axis=1) > _MIN_TANGENT_PART)
+    return values, unit(np.where(directed[:, None], steepest, 0.0))
 
 
-def _fit_faces(surface: Surface, radius: int) -> tuple[Faces, PointMask]:
-    """Return the faces that libigl may see, and at which points (V,) a fit would be arbitrary."""
-    unclear = np.zeros(surface.n_points, dtype=np.bool_)
+def _faces_to_fit(surface: Surface, radius: int) -> tuple[Faces, PointMask]:
+    """Return the faces on which libigl is safe, and the points (V,) at which its fit is arbitrary."""
+    unreliable = np.zeros(surface.n_points, dtype=np.bool_)
     longest = surface.edge_lengths[surface.face_edges].max(axis=1)
-    faces = surface.faces[2.0 * surface.face_areas > _NEEDLE * longest**2]
+    faces = surface.faces[2.0 * surface.face_areas > _MIN_FIT_HEIGHT * longest**2]
     if len(faces) == 0:
-        return faces, unclear
+        return faces, unreliable
     used, local = np.unique(faces, return_inverse=True)
     local = local.reshape(-1, 3).astype(np.int32)
     normals = igl.per_vertex_normals(surface.points[used], local.astype(np.int64))
-    agreement = _ring_agreement(normals, edges_of(local)[0], radius)
-    unclear[used] = ~(agreement > _UNCLEAR)
-    hazard = ~(agreement > _CANCELLED)
-    if hazard.any():
+    length = _mean_ring_normal(normals, edges_of(local)[0], radius)
+    unreliable[used] = ~(length > _MIN_RELIABLE_NORMAL)
+    unsafe = ~(length > _MIN_SAFE_NORMAL)
+    if unsafe.any():
         _, component = connected_components(local, len(used))
-        faces = faces[~np.isin(component, component[hazard[local].any(axis=1)])]
-    return faces, unclear
+        faces = faces[~np.isin(component, component[unsafe[local].any(axis=1)])]
+    return faces, unreliable
 
 
-def _ring_agreement(normals: PointVectors, edges: Edges, radius: int) -> npt.NDArray[np.float64]:
-    """Return the length of the mean normal (V,) over the points within this many edges of each point."""
+def _mean_ring_normal(normals: PointVectors, edges: Edges, radius: int) -> PointScalars:
+    """Return the length of the mean unit normal (V,) over the ``radius``-ring of each point."""
     size = len(normals)
     rows, columns = np.concatenate([edges, edges[:, ::-1]]).T
     step = sparse.csr_matrix((np.ones(len(rows), dtype=np.bool_), (rows, columns)), shape=(size, size))
     step = step + sparse.identity(size, dtype=np.bool_, format="csr")
     result = np.empty(size)
-    for start in range(0, size, _CHUNK):
-        reach = step[start : start + _CHUNK]
+    for start in range(0, size, _RING_BLOCK):
+        ring = step[start : start + _RING_BLOCK]
         for _ in range(radius - 1):
-            reach = reach @ step
-        mean = (reach.astype(np.float64) @ normals) / np.diff(reach.indptr)[:, None]
-        result[start : start + _CHUNK] = np.linalg.norm(mean, axis=1)
+            ring = ring @ step
+        mean = (ring.astype(np.float64) @ normals) / np.diff(ring.indptr)[:, None]
+        result[start : start + _RING_BLOCK] = np.linalg.norm(mean, axis=1)
     return result
 
 
-def _integrated(surface: Surface, normals: PointVectors) -> tuple[PointPairs, PointVectors]:
-    """Return rough curvatures sorted by magnitude and the direction of the larger one, from the one-rings."""
+def _taubin_curvatures(surface: Surface, normals: PointVectors) -> tuple[PointPairs, PointVectors]:
+    """Return curvatures sorted by magnitude and the direction of the larger, of Taubin's one-ring estimate."""
     frames = tangent_frames(normals)
     centre = surface.faces[:, [0, 0, 1, 1, 2, 2]].ravel()
     other = surface.faces[:, [1, 2, 2, 0, 0, 1]].ravel()

@@ -1,4 +1,4 @@
-"""Lines of stretch: what the network predicts, from and to metric tensors."""
+"""Line fields (2-RoSy fields): one unsigned direction with a magnitude at each point."""
 
 from __future__ import annotations
 
@@ -6,33 +6,115 @@ from typing import Any
 
 import numpy as np
 import numpy.typing as npt
+from scipy import sparse
 
-from anisomesh._arrays import PointTensors, PointVectors
-from anisomesh.metric.tangent import line_field, line_tensors
+from anisomesh._arrays import PointScalars, PointTensors, PointVectors
+from anisomesh.mesh.surface import Surface
+from anisomesh.metric.tangent import TangentFrames
 
-MOST = float(np.log(400.0))  # the logarithm of the largest squared stretch
+LineField = npt.NDArray[np.complex128]
+"""Magnitude at twice the angle to the first frame vector (V,), so that opposite directions are equal numbers."""
 
-Frames = npt.NDArray[np.float64]
+MAX_LOG_STRETCH_SQUARED = float(np.log(400.0))  # dimensionless: the limits of the curvature metric, 400 / 1
+
+_MIN_EIGENVALUE = 1e-30  # guard against division by zero only
 
 
-def directions_of(tensors: PointTensors) -> tuple[PointVectors, npt.NDArray[np.float64]]:
-    """Return the direction of largest metric (N, 3), and the logarithm of largest over middle eigenvalue (N,).
+def line_field_of_directions(directions: PointVectors, magnitude: PointScalars, frames: TangentFrames) -> LineField:
+    """Return the line field (V,) of directions with magnitudes.
 
-    Of the paper's metric, with eigenvalues 1, 1 and r^2, these are v_max and 2 log r. Of that of an embedding, which is
-    1 along the normal and no less in the surface, they are the direction and square of its stretch.
+    Perpendicular directions give opposite numbers, so sums of these numbers average lines without a choice of signs.
+
+    Parameters
+    ----------
+    directions
+        Tangent vectors (V, 3); neither their sign nor their length matters.
+    magnitude
+        Magnitude of each line (V,).
+    frames
+        Tangent frames (V, 2, 3).
+
+    References
+    ----------
+    Knoppel, Crane, Pinkall, Schroder, "Globally optimal direction fields", 2013 (representation).
+    """
+    along = np.einsum("vx,vix->vi", directions, frames)
+    angle = np.arctan2(along[:, 1], along[:, 0])
+    return np.asarray(magnitude * np.exp(2j * angle))
+
+
+def directions_of_line_field(field: LineField, frames: TangentFrames) -> PointVectors:
+    """Return the unit tangent direction (V, 3) of each line; its sign is arbitrary."""
+    angle = 0.5 * np.angle(field)
+    return np.asarray(np.cos(angle)[:, None] * frames[:, 0] + np.sin(angle)[:, None] * frames[:, 1])
+
+
+def projectors_of_line_field(field: LineField, frames: TangentFrames) -> PointTensors:
+    """Return the projector v v^t (V, 3, 3) onto the direction v of each line."""
+    directions = directions_of_line_field(field, frames)
+    return np.asarray(directions[:, :, None] * directions[:, None, :])
+
+
+def principal_stretch(tensors: PointTensors) -> tuple[PointVectors, PointScalars]:
+    """Return the eigenvector of the largest eigenvalue (V, 3) and the logarithm of largest over middle (V,).
+
+    For the curvature metric (eigenvalues 1, 1, r^2) these are v_max and 2 log r. For the metric of an embedding
+    (eigenvalue 1 along the normal, at least 1 in the tangent plane) they are direction and logarithm of the squared
+    stretch.
     """
     values, vectors = np.linalg.eigh(tensors)
-    return np.asarray(vectors[:, :, 2]), np.asarray(np.log(values[:, 2] / np.maximum(values[:, 1], 1e-30)))
+    return np.asarray(vectors[:, :, 2]), np.asarray(np.log(values[:, 2] / np.maximum(values[:, 1], _MIN_EIGENVALUE)))
 
 
-def lines_in(frames: Frames, directions: PointVectors, logarithms: npt.NDArray[np.float64]) -> npt.NDArray[np.float32]:
-    """Return lines (N, 2) in tangent frames (N, 2, 3): the logarithm at twice the angle of the direction."""
-    field = line_field(directions, logarithms, frames)
+def line_field_components(
+    directions: PointVectors, log_stretch_squared: PointScalars, frames: TangentFrames
+) -> npt.NDArray[np.float32]:
+    """Return real and imaginary part (V, 2), in single precision, of the line field of :func:`principal_stretch`."""
+    field = line_field_of_directions(directions, log_stretch_squared, frames)
     return np.stack([field.real, field.imag], axis=1).astype(np.float32)
 
 
-def tensors_of(lines: npt.NDArray[Any], frames: Frames) -> PointTensors:
-    """Return the paper's metric (N, 3, 3) for lines (N, 2): 1 but for r^2 along the line, r^2 = exp(length)."""
-    field = lines[:, 0].astype(np.float64) + 1j * lines[:, 1].astype(np.float64)
-    square = np.exp(np.minimum(np.abs(field), MOST))
-    return np.asarray(np.eye(3) + (square - 1.0)[:, None, None] * line_tensors(field, frames))
+def tensors_of_line_field(components: npt.NDArray[Any], frames: TangentFrames) -> PointTensors:
+    """Return the curvature metric (V, 3, 3), eigenvalues 1, 1 and r^2, of a line field (V, 2) with magnitude 2 log r.
+
+    Larger magnitudes are cut off at ``MAX_LOG_STRETCH_SQUARED``.
+    """
+    field = components[:, 0].astype(np.float64) + 1j * components[:, 1].astype(np.float64)
+    stretch_squared = np.exp(np.minimum(np.abs(field), MAX_LOG_STRETCH_SQUARED))
+    return np.asarray(np.eye(3) + (stretch_squared - 1.0)[:, None, None] * projectors_of_line_field(field, frames))
+
+
+def one_ring_averages(
+    surface: Surface, normals: PointVectors, frames: TangentFrames
+) -> tuple[sparse.csr_matrix, sparse.csr_matrix]:
+    """Return two matrices (V, V) that average a scalar and a line field over each point and its neighbours.
+
+    Parameters
+    ----------
+    surface, normals, frames
+        The surface, its unit normals (V, 3) and tangent frames (V, 2, 3).
+
+    Notes
+    -----
+    A neighbour's frame is transported by the smallest rotation that takes its normal to the normal of the point,
+    which keeps the magnitude of a line; a projection would shrink lines on curved surfaces. A neighbour has as weight
+    the cosine of the angle between the two normals, and none beyond 90 degrees, so that nothing is averaged across a
+    fold; the point itself has weight 1.
+    """
+    i, j = np.concatenate([surface.edges, surface.edges[:, ::-1]]).T
+    cosine = np.einsum("ex,ex->e", normals[i], normals[j])
+    near = cosine > 0.0
+    i, j, cosine = i[near], j[near], cosine[near]
+    carried = frames[j, 0]
+    lift = np.einsum("ex,ex->e", carried, normals[i]) / (1.0 + cosine)
+    carried = carried - lift[:, None] * (normals[i] + normals[j])
+    along = np.einsum("ex,ekx->ek", carried, frames[i])
+    turn = np.exp(2j * np.arctan2(along[:, 1], along[:, 0]))
+    own = np.arange(surface.n_points)
+    rows, columns = np.concatenate([own, i]), np.concatenate([own, j])
+    weight = np.concatenate([np.ones(len(own)), cosine])
+    weight /= np.bincount(rows, weight)[rows]
+    shape = (surface.n_points, surface.n_points)
+    scalar = sparse.csr_matrix((weight, (rows, columns)), shape=shape)
+    line = sparse.csr_matrix((weight * np.concatenate([np.ones(len(own)), turn]), (rows, columns)), shape=shape)
+    return scalar, line

@@ -12,7 +12,7 @@ from anisomesh._arrays import Points
 from anisomesh.errors import MeshError
 from anisomesh.mesh import topology
 from anisomesh.mesh.surface import Surface
-from anisomesh.metric.curvature import Curvature
+from anisomesh.metric.curvature import PrincipalCurvatures
 
 _GRID = 80  # cells along the longest side of the box
 _REACH = 1.7  # radii of a blob, within which the level set is
@@ -71,7 +71,7 @@ class Blobs:
             points = points - (self.value(points) / square)[:, None] * gradient
         return points
 
-    def curvature(self, points: Points) -> Curvature:
+    def curvature(self, points: Points) -> PrincipalCurvatures:
         """Return the exact principal curvatures of the level set through the points (n, 3).
 
         The shape operator is P H P / |g| with gradient g, second derivatives H, and P the projection along g.
@@ -87,7 +87,7 @@ class Blobs:
         rows = np.arange(len(points))[:, None]
         pair, directions = values[rows, tangent], vectors.transpose(0, 2, 1)[rows, tangent]
         order = np.argsort(np.abs(pair), axis=1)
-        return Curvature(
+        return PrincipalCurvatures(
             values=pair[rows, order], directions=directions[rows, order], trusted=np.ones(len(points), dtype=bool)
         )
 

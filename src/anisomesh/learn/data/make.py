@@ -1,4 +1,4 @@
-"""From one shape to the items that a network learns from: the even mesh, and other meshes of the same shape."""
+"""From one shape to its items: a mesh with even triangles, and variants of the same shape with other triangles."""
 
 from __future__ import annotations
 
@@ -16,52 +16,54 @@ from anisomesh.embedding.direct import embed
 from anisomesh.errors import AnisomeshError, OptionError
 from anisomesh.learn.data.items import Item
 from anisomesh.learn.data.recipe import Recipe
+from anisomesh.learn.data.remesher import REMESH_SECONDS, Remesher
 from anisomesh.learn.data.retriangulate import with_random_triangles
 from anisomesh.mesh.closest_points import ClosestPoints
 from anisomesh.mesh.geometry import Frame, thickness, unit_frame
 from anisomesh.mesh.surface import Surface
 from anisomesh.mesh.working_surface import working_surface
 from anisomesh.meshops.collapse import decimate
-from anisomesh.metric.curvature import Curvature, principal_curvatures
-from anisomesh.metric.quality import transfer_metric_roots
+from anisomesh.metric.curvature import PrincipalCurvatures, principal_curvatures
 from anisomesh.metric.tensors import curvature_metric, metric_root
-from anisomesh.pipeline import remesh
+from anisomesh.metric.transfer import transfer_metric_roots
 from anisomesh.repair.prepare import prepare
 from anisomesh.shapes.implicit import Blobs
 
-_REGULAR = 0.4330127  # thickness of an equilateral triangle
-_COUNTS = (0.6, 1.6)  # of the wanted number of points that a mesh may have without being made anew
-_EVEN = 0.7  # mean thickness, as a share of the regular one, from which on a mesh is even
-_DECIMATED, _STRETCHED = (0.35, 0.75), (0.5, 1.0)  # of the points that such variants have
-_GIVEN = 0.5  # mean thickness, as such a share, from which on the curvature of a mesh as it is given is worth learning
-_MOST_GIVEN = 4  # times the wanted number of points that such a mesh may have
-_SITES = (0.2, 1.0)  # of its points: the numbers of sites that its working surface is for
-_SECONDS = 120.0  # for a remesh
+# Shares and limits below are heuristic, chosen on training meshes.
+_EQUILATERAL_THICKNESS = 0.4330127  # sqrt(3) / 4, area over squared longest side
+_EVEN_COUNT_RANGE = (0.6, 1.6)  # of the target: point counts of meshes that are used as they are
+_MIN_EVEN_REGULARITY = 0.7  # mean thickness over the equilateral one of such meshes
+_DECIMATED_RANGE, _STRETCHED_RANGE = (0.35, 0.75), (0.5, 1.0)  # of the points of the even mesh: sizes of variants
+_MIN_INPUT_REGULARITY = 0.5  # mean thickness over the equilateral one of input meshes whose own metric is an item
+_MAX_INPUT_COUNT = 4  # times the target: point count of such meshes
+_SITE_RANGE = (0.2, 1.0)  # of their points: numbers of sites that their long edges are split for
 
-MetricOn = Callable[[Surface], tuple[PointTensors, PointMask]]
-
-
-def require_packages(recipe: Recipe) -> None:
-    """Raise ``OptionError`` if a package is missing that a recipe needs."""
-    if recipe.evening == "tetwild" and not importlib.util.find_spec("pytetwild"):
-        raise OptionError("evening with tetwild needs the package pytetwild: pip install pytetwild")
+MetricOnMesh = Callable[[Surface], tuple[PointTensors, PointMask]]
 
 
 class UnsuitableError(AnisomeshError):
-    """A shape is left out of a data set, for a reason that is no fault."""
+    """A shape is left out of a data set because nothing can be learnt from it."""
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
-class Made:
-    """An item, what kind of mesh it is, and what is written of it in the list of the data set."""
+class LabelledItem:
+    """An item, the kind of its mesh (``"even"`` or a variant), and the facts about it in the manifest."""
 
     kind: str
     item: Item
     facts: dict[str, Any] = field(default_factory=dict)
 
 
-def items_of_mesh(surface: Surface, recipe: Recipe, rng: np.random.Generator) -> list[Made]:
-    """Return the items of a mesh: its even mesh first, then the variants.
+def require_packages(recipe: Recipe) -> None:
+    """Raise ``OptionError`` if a package that a recipe needs is not installed."""
+    if recipe.evening == "tetwild" and not importlib.util.find_spec("pytetwild"):
+        raise OptionError("evening with tetwild needs the package pytetwild: pip install pytetwild")
+
+
+def items_of_mesh(
+    surface: Surface, recipe: Recipe, rng: np.random.Generator, remesher: Remesher
+) -> list[LabelledItem]:
+    """Return the items of a mesh: the even mesh first, then the variants.
 
     Parameters
     ----------
@@ -70,25 +72,26 @@ def items_of_mesh(surface: Surface, recipe: Recipe, rng: np.random.Generator) ->
     recipe
         How items are made.
     rng
-        Of the variants.
+        Random numbers of the variants.
+    remesher
+        Makes meshes even, and stretched.
 
     Raises
     ------
     UnsuitableError
-        If it is flat or round everywhere, or its embedding has too large a residual.
+        If the shape is flat or round everywhere, the residual of its embedding is too large, or it cannot be made even.
     AnisomeshError
-        If it is no mesh, or cannot be made even.
+        If the mesh cannot be used.
 
     Notes
     -----
-    The targets of variants are the metric of the even mesh, from the closest point: a network that sees a bad
-    triangulation is to find what a good one shows. That of the given mesh is its own metric, which depends on its
-    triangles: the fit of curvature is over rings of edges.
+    The target of a variant is the metric of the even mesh at the closest point, so that a network learns to see on a
+    bad triangulation what a good one shows. The target of the input mesh is its own metric, which depends on its
+    triangles because curvature is fitted over rings of edges.
     """
-    given = prepare(surface).surface
-    clean = evened(given, recipe)
-    is_even = clean is given
-    clean = clean.with_points(unit_frame(clean.points).to_unit(clean.points))
+    prepared = prepare(surface).surface
+    even = even_mesh(prepared, recipe, remesher)
+    clean = _in_unit_frame(even)
     curvature = principal_curvatures(clean)
     reference, roots = ClosestPoints(clean), metric_root(curvature_metric(clean, curvature))
 
@@ -98,60 +101,88 @@ def items_of_mesh(surface: Surface, recipe: Recipe, rng: np.random.Generator) ->
         found = transfer_metric_roots(reference, roots, mesh.points)
         return found @ found, np.asarray(curvature.trusted[nearest])
 
-    made = _items(clean, metric_on, lambda points: points, recipe, rng)
-    if "given" in recipe.variants and not is_even:
-        made += _given(given, recipe, rng)
-    return made
+    variants = _random_variants(clean, recipe, rng, remesher)
+    items = _items_on(clean, variants, metric_on, recipe)
+    if "given" in recipe.variants and even is not prepared:
+        items += _input_items(prepared, recipe, rng)
+    return items
 
 
-def items_of_blobs(blobs: Blobs, recipe: Recipe, rng: np.random.Generator) -> list[Made]:
-    """Return the same for a shape whose curvature is known exactly, at the points of every mesh of it."""
+def items_of_blobs(
+    blobs: Blobs, recipe: Recipe, rng: np.random.Generator, remesher: Remesher
+) -> list[LabelledItem]:
+    """Return the items of an implicit shape, with its exact curvature at the points of each mesh.
+
+    See :func:`items_of_mesh`; there is no input mesh.
+    """
     rough = blobs.mesh()
-    even = remesh(rough, n_vertices=recipe.target, metric="uniform", threads=1, time_limit=_SECONDS).surface
-    points = blobs.project(even.points)
+    result = remesher(rough, n_vertices=recipe.target, metric="uniform", threads=1, time_limit=REMESH_SECONDS)
+    points = blobs.project(result.surface.points)
     frame = unit_frame(points)
 
     def metric_on(mesh: Surface) -> tuple[PointTensors, PointMask]:
         curvature = blobs.curvature(frame.to_model(mesh.points))
-        scaled = Curvature(
+        scaled = PrincipalCurvatures(
             values=curvature.values * frame.scale, directions=curvature.directions, trusted=curvature.trusted
         )
         return curvature_metric(mesh, scaled), scaled.trusted
 
-    clean = Surface(frame.to_unit(points), even.faces)
-    return _items(clean, metric_on, _settling(blobs, frame), recipe, rng)
+    clean = Surface(frame.to_unit(points), result.surface.faces)
+    variants = _random_variants(clean, recipe, rng, remesher)
+    projected = {kind: mesh.with_points(_projected(mesh.points, blobs, frame)) for kind, mesh in variants.items()}
+    return _items_on(clean, projected, metric_on, recipe)
 
 
-def evened(surface: Surface, recipe: Recipe) -> Surface:
-    """Return a mesh of about the wanted number of even triangles: the same one, if it is like that."""
-    low, high = (share * recipe.target for share in _COUNTS)
-    if low <= surface.n_points <= high and _regularity(surface) >= _EVEN:
+def even_mesh(surface: Surface, recipe: Recipe, remesher: Remesher) -> Surface:
+    """Return a mesh of about the target number of even triangles: the surface itself if it is one.
+
+    Raises
+    ------
+    UnsuitableError
+        If there is no such mesh without inverted triangles.
+    """
+    low, high = (share * recipe.target for share in _EVEN_COUNT_RANGE)
+    if low <= surface.n_points <= high and _regularity(surface) >= _MIN_EVEN_REGULARITY:
         return surface
     if recipe.evening == "tetwild":
         require_packages(recipe)
-        surface = _tetwild(surface)
-    result = remesh(surface, n_vertices=recipe.target, metric="uniform", threads=1, time_limit=_SECONDS)
+        surface = _tetwild_boundary(surface)
+    result = remesher(surface, n_vertices=recipe.target, metric="uniform", threads=1, time_limit=REMESH_SECONDS)
     if result.validity.inverted or result.surface.n_points > high:
         raise UnsuitableError(f"cannot be made even: {'; '.join(result.warnings)}")
     return result.surface
 
 
-def _items(
-    clean: Surface, metric_on: MetricOn, settle: Callable[[Points], Points], recipe: Recipe, rng: np.random.Generator
-) -> list[Made]:
-    even = _made("even", clean, metric_on, recipe)
+def _random_variants(
+    clean: Surface, recipe: Recipe, rng: np.random.Generator, remesher: Remesher
+) -> dict[str, Surface]:
+    """Return the decimated and stretched meshes of a recipe, in its order."""
+    variants = {}
+    for kind in recipe.variants:
+        if kind == "decimated":
+            n = round(rng.uniform(*_DECIMATED_RANGE) * clean.n_points)
+            points, faces, _ = decimate(clean.points, clean.faces, n, ClosestPoints(clean))
+            variants[kind] = Surface(points, faces)
+        elif kind == "stretched":
+            n = round(rng.uniform(*_STRETCHED_RANGE) * clean.n_points)
+            variants[kind] = with_random_triangles(clean, n, rng, remesher)
+    return variants
+
+
+def _items_on(
+    clean: Surface, variants: dict[str, Surface], metric_on: MetricOnMesh, recipe: Recipe
+) -> list[LabelledItem]:
+    """Return the item of the even mesh and the items of its variants."""
+    even = _item_on("even", clean, metric_on, recipe)
     residual, stretch = even.facts["residual"], even.facts["stretch"]
     if residual > recipe.max_residual:
-        raise UnsuitableError(f"the embedding is off the metric by {residual:.2f}, more than {recipe.max_residual}")
+        raise UnsuitableError(f"the residual of the embedding is {residual:.2f}, more than {recipe.max_residual}")
     if stretch < recipe.min_stretch:
         raise UnsuitableError(f"flat or round everywhere: the mean stretch is {stretch:.3f}")
-    makers = {"decimated": _decimated, "stretched": _stretched}
-    meshes = {kind: makers[kind](clean, rng) for kind in recipe.variants if kind in makers}
-    variants = {kind: mesh.with_points(settle(mesh.points)) for kind, mesh in meshes.items()}
-    return [even, *(_made(kind, mesh, metric_on, recipe) for kind, mesh in variants.items())]
+    return [even, *(_item_on(kind, mesh, metric_on, recipe) for kind, mesh in variants.items())]
 
 
-def _made(kind: str, mesh: Surface, metric_on: MetricOn, recipe: Recipe) -> Made:
+def _item_on(kind: str, mesh: Surface, metric_on: MetricOnMesh, recipe: Recipe) -> LabelledItem:
     tensors, trusted = metric_on(mesh)
     embedding = embed(mesh, tensors, max_iterations=recipe.iterations)
     facts = {
@@ -161,48 +192,43 @@ def _made(kind: str, mesh: Surface, metric_on: MetricOn, recipe: Recipe) -> Made
         "stretch": round(embedding.stretch.asked_mean, 4),
         "trusted": round(float(trusted.mean()), 4),
     }
-    return Made(kind=kind, item=Item.of(mesh, tensors, embedding.points[:, 3:], trusted), facts=facts)
+    return LabelledItem(kind=kind, item=Item.of(mesh, tensors, embedding.points[:, 3:], trusted), facts=facts)
 
 
-def _given(surface: Surface, recipe: Recipe, rng: np.random.Generator) -> list[Made]:
-    """Return the item of a mesh as it is given, with the curvature measured on it; none if it is not worth learning."""
-    if _regularity(surface) < _GIVEN:
+def _input_items(surface: Surface, recipe: Recipe, rng: np.random.Generator) -> list[LabelledItem]:
+    """Return the item of an input mesh with its own curvature, none if its triangles are bad or too many."""
+    if _regularity(surface) < _MIN_INPUT_REGULARITY:
         return []
-    surface = surface.with_points(unit_frame(surface.points).to_unit(surface.points))
-    n_sites = round(surface.n_points * np.exp(rng.uniform(*np.log(_SITES))))
+    surface = _in_unit_frame(surface)
+    n_sites = round(surface.n_points * np.exp(rng.uniform(*np.log(_SITE_RANGE))))
     working = working_surface(surface, n_sites).surface
-    if working.n_points > _MOST_GIVEN * recipe.target:
+    if working.n_points > _MAX_INPUT_COUNT * recipe.target:
         return []
     curvature = principal_curvatures(working)
-    made = _made("given", working, lambda mesh: (curvature_metric(mesh, curvature), curvature.trusted), recipe)
-    return [made] if made.facts["residual"] <= recipe.max_residual else []
+    item = _item_on("given", working, lambda mesh: (curvature_metric(mesh, curvature), curvature.trusted), recipe)
+    return [item] if item.facts["residual"] <= recipe.max_residual else []
+
+
+def _in_unit_frame(surface: Surface) -> Surface:
+    return surface.with_points(unit_frame(surface.points).to_unit(surface.points))
 
 
 def _regularity(surface: Surface) -> float:
-    """Return the mean thickness of the triangles as a share of that of regular ones."""
-    return float(thickness(surface.points[surface.faces]).mean()) / _REGULAR
+    """Return the mean thickness of the triangles over the thickness of an equilateral one."""
+    return float(thickness(surface.points[surface.faces]).mean()) / _EQUILATERAL_THICKNESS
 
 
-def _decimated(clean: Surface, rng: np.random.Generator) -> Surface:
-    n = round(rng.uniform(*_DECIMATED) * clean.n_points)
-    points, faces, _ = decimate(clean.points, clean.faces, n, ClosestPoints(clean))
-    return Surface(points, faces)
+def _projected(points: Points, blobs: Blobs, frame: Frame) -> Points:
+    """Return the projections onto the shape of points in the frame."""
+    return frame.to_unit(blobs.project(frame.to_model(points)))
 
 
-def _stretched(clean: Surface, rng: np.random.Generator) -> Surface:
-    return with_random_triangles(clean, round(rng.uniform(*_STRETCHED) * clean.n_points), rng)
-
-
-def _settling(blobs: Blobs, frame: Frame) -> Callable[[Points], Points]:
-    return lambda points: frame.to_unit(blobs.project(frame.to_model(points)))
-
-
-def _tetwild(surface: Surface) -> Surface:
-    """Return the boundary, seen from outside, of the tetrahedra that pytetwild makes of a surface."""
+def _tetwild_boundary(surface: Surface) -> Surface:
+    """Return the outward oriented boundary of pytetwild's tetrahedral mesh of a surface."""
     import pytetwild
 
-    arrays = np.array(surface.points), np.array(surface.faces, dtype=np.int32)  # it takes no read-only ones
-    with TemporaryDirectory() as folder, chdir(folder):  # it leaves a file in the current one
+    arrays = np.array(surface.points), np.array(surface.faces, dtype=np.int32)  # it refuses read-only arrays
+    with TemporaryDirectory() as folder, chdir(folder):  # it writes a file into the current folder
         points, cells = pytetwild.tetrahedralize(*arrays, optimize=False, quiet=True)
     inverted = np.linalg.det(points[cells[:, 1:]] - points[cells[:, :1]]) < 0.0
     cells[inverted] = cells[inverted][:, [1, 0, 2, 3]]

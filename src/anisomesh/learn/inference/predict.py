@@ -21,7 +21,7 @@ from anisomesh.learn.models.hierarchy import pyramid
 from anisomesh.learn.models.paper import PaperNetwork, seen_of
 from anisomesh.learn.models.stretch import StretchNetwork
 from anisomesh.mesh.surface import Surface
-from anisomesh.metric.line_field import tensors_of
+from anisomesh.metric.line_field import tensors_of_line_field
 
 NOISE_FLOOR = 0.05
 """Mean edge lengths; less noise than that is left."""
@@ -106,7 +106,7 @@ def _stretch(network: StretchNetwork, surface: Surface, *, denoise: bool) -> Pre
             break
         current = current.with_points(current.points + offsets)
     return Predicted(
-        tensors=tensors_of(found.lines.cpu().numpy(), seen.frames),
+        tensors=tensors_of_line_field(found.lines.cpu().numpy(), seen.frames),
         points=current.points,
         noise=_height(surface, current.points - surface.points),
     )
