@@ -1,4 +1,4 @@
-"""The frozen triangle mesh that every stage takes and returns."""
+"""The immutable triangle mesh that every stage takes and returns."""
 
 from __future__ import annotations
 
@@ -26,25 +26,31 @@ from anisomesh.mesh import geometry, topology
 
 @dataclass(frozen=True, eq=False)
 class Surface:
-    """A triangle mesh in 3-D; derived tables are computed once, on first use.
+    """An immutable triangle mesh in 3-D.
 
     Parameters
     ----------
     points
         Coordinates (V, 3) in model units; copied to float64.
     faces
-        Point indices (F, 3), counter-clockwise seen from outside; copied to int32.
+        Point indices (F, 3), counted from 0, counter-clockwise seen from outside; copied to int32.
 
     Raises
     ------
     MeshError
-        If the shapes are wrong, a coordinate is not finite, an index is out of range, or there is no face.
+        If an array has the wrong shape, a coordinate is not finite, an index is out of range or not an integer, or
+        there is no face.
 
     Notes
     -----
-    Column ``c`` of the per-face tables belongs to the side *opposite* corner ``c``, that is the side from
-    corner ``c + 1`` to corner ``c + 2``. The arrays are read-only, so a surface can be shared between stages
-    and threads.
+    Only what is listed under Raises is validated. Surfaces may be non-manifold, inconsistently oriented, open or
+    degenerate and may have unused points; :func:`~anisomesh.repair.prepare.prepare` makes an oriented manifold.
+
+    Every other attribute is derived from the two arrays, computed on first use and cached: the edges (E, 2), the
+    adjacency of faces and edges, normals, areas and lengths. Lengths are in model units and normals are unit vectors.
+    Indices are int32, -1 means "none". Column ``c`` of the tables (F, 3) per side refers to the side *opposite* corner
+    ``c``, from corner ``c + 1`` to ``c + 2``. ``points`` and ``faces`` are read-only; do not write to derived tables
+    either, since stages and threads share them.
     """
 
     points: Points
@@ -60,12 +66,12 @@ class Surface:
 
     @property
     def n_points(self) -> int:
-        """Number of points."""
+        """Number of points, V."""
         return len(self.points)
 
     @property
     def n_faces(self) -> int:
-        """Number of faces."""
+        """Number of faces, F."""
         return len(self.faces)
 
     @cached_property
@@ -79,44 +85,44 @@ class Surface:
 
     @property
     def face_edges(self) -> FaceIndices:
-        """Edge opposite each corner, (F, 3)."""
+        """Index of the edge opposite each corner, (F, 3)."""
         return self._edge_tables[1]
 
     @cached_property
     def edge_face_count(self) -> npt.NDArray[np.int32]:
-        """Number of faces at each edge, (E,): 1 on the boundary, 2 inside, more where not manifold."""
+        """Number of faces at each edge, (E,): 1 at a boundary edge, 2 in the interior, more at a non-manifold edge."""
         return np.bincount(self.face_edges.ravel(), minlength=len(self.edges)).astype(np.int32)
 
     @cached_property
     def edge_faces(self) -> EdgeIndices:
-        """The two faces at each edge (E, 2), the second -1 on the boundary; -1, -1 where not manifold."""
+        """The two faces at each edge, (E, 2): the second is -1 at a boundary edge, both at a non-manifold edge."""
         return topology.edge_faces(self.face_edges, len(self.edges))
 
     @cached_property
     def on_boundary(self) -> PointMask:
-        """Which points (V,) are ends of an edge with one face."""
+        """Which points (V,) are end points of a boundary edge."""
         mask = np.zeros(self.n_points, dtype=bool)
         mask[self.edges[self.edge_face_count == 1]] = True
         return mask
 
     @cached_property
     def face_neighbours(self) -> FaceIndices:
-        """Face across the side opposite each corner (F, 3); -1 at a boundary or a non-manifold edge."""
+        """Face across the side opposite each corner, (F, 3); -1 at boundary and non-manifold edges."""
         return topology.face_neighbours(self.face_edges, self.edge_faces)
 
     @cached_property
     def face_normals(self) -> FaceVectors:
-        """Unit normals (F, 3); zero where a face has no area."""
+        """Unit normals of the faces (F, 3); zero where a face has no area."""
         return geometry.unit(geometry.face_cross(self.points, self.faces))
 
     @cached_property
     def face_areas(self) -> FaceScalars:
-        """Areas (F,) in model units squared."""
+        """Areas of the faces (F,), in model units squared."""
         return np.asarray(0.5 * np.linalg.norm(geometry.face_cross(self.points, self.faces), axis=1))
 
     @cached_property
     def point_normals(self) -> PointVectors:
-        """Area-weighted unit normals (V, 3); zero at a point without faces."""
+        """Area-weighted unit normals of the points (V, 3); zero at a point without faces."""
         return geometry.point_normals(self.points, self.faces)
 
     @cached_property
@@ -131,11 +137,11 @@ class Surface:
 
     @cached_property
     def edge_lengths(self) -> npt.NDArray[np.float64]:
-        """Length of every edge (E,), in model units."""
+        """Lengths of the edges (E,), in model units."""
         return np.asarray(np.linalg.norm(self.points[self.edges[:, 0]] - self.points[self.edges[:, 1]], axis=1))
 
     def with_points(self, points: npt.NDArray[Any]) -> Surface:
-        """Return the same faces on other points (V, 3)."""
+        """Return a surface with the same faces on other points (V, 3)."""
         return Surface(np.asarray(points), self.faces)
 
 
@@ -143,21 +149,23 @@ def _validated(points: npt.NDArray[Any], faces: npt.NDArray[Any]) -> tuple[Point
     points = np.array(points, dtype=np.float64, order="C")
     faces = np.asarray(faces)
     if points.ndim != 2 or points.shape[1] != 3:
-        raise MeshError(f"points has shape {points.shape}; expected (V, 3)")
+        raise MeshError(f"points has shape {points.shape}; expected (V, 3), one row x, y, z for each point")
     if faces.ndim != 2 or faces.shape[1] != 3:
-        raise MeshError(f"faces has shape {faces.shape}; expected (F, 3): triangulate polygons first")
+        raise MeshError(f"faces has shape {faces.shape}; expected (F, 3); triangulate polygons first")
     if len(faces) == 0:
-        raise MeshError("the mesh has no face; a surface needs at least one triangle")
+        raise MeshError("the mesh has no face; expected at least one triangle")
     if not np.issubdtype(faces.dtype, np.integer):
-        raise MeshError(f"faces has dtype {faces.dtype}; expected integers")
+        raise MeshError(f"faces has dtype {faces.dtype}; expected integers; convert with faces.astype(int)")
     bad = np.flatnonzero(~np.isfinite(points).all(axis=1))
     if len(bad):
-        raise MeshError(f"points[{bad[0]}] = {points[bad[0]].tolist()} is not finite ({len(bad)} such points)")
+        raise MeshError(
+            f"points[{bad[0]}] = {points[bad[0]].tolist()} is not finite ({len(bad)} such points); correct them"
+        )
     bad = np.flatnonzero(((faces < 0) | (faces >= len(points))).any(axis=1))
     if len(bad):
         raise MeshError(
-            f"faces[{bad[0]}] = {faces[bad[0]].tolist()} refers to a point out of range; "
-            f"there are {len(points)} points ({len(bad)} such faces)"
+            f"faces[{bad[0]}] = {faces[bad[0]].tolist()} has an index out of range; expected 0 to {len(points) - 1} "
+            f"since there are {len(points)} points ({len(bad)} such faces)"
         )
     faces = np.array(faces, dtype=np.int32, order="C")
     points.flags.writeable = False

@@ -1,4 +1,7 @@
-"""Connectivity of triangle lists: edges, adjacency, boundary loops, components."""
+"""Connectivity of triangle lists (F, 3): edges, adjacency, fans, components and boundary loops.
+
+Side ``3 f + c`` of a mesh is the directed edge opposite corner ``c`` of face ``f``, from corner ``c + 1`` to ``c + 2``.
+"""
 
 from __future__ import annotations
 
@@ -11,12 +14,12 @@ from anisomesh._arrays import EdgeIndices, Edges, FaceIndices, FaceLabels, Faces
 
 
 def half_edges(faces: Faces) -> npt.NDArray[np.int32]:
-    """Return the directed sides (3F, 2) of the faces: row ``3 f + c`` is the side opposite corner ``c``."""
+    """Return the start and end point of every side, (3F, 2)."""
     return faces[:, [[1, 2], [2, 0], [0, 1]]].reshape(-1, 2)
 
 
 def edge_keys(ends: npt.NDArray[np.integer]) -> npt.NDArray[np.int64]:
-    """Return a number for each edge (n,), the same for both orders of its ends (n, 2)."""
+    """Return a key (n,) of each edge (n, 2), independent of the order of its end points."""
     low, high = np.sort(ends, axis=1).astype(np.int64).T
     return np.asarray(low << 32 | high)
 
@@ -29,7 +32,7 @@ def edges_of(faces: Faces) -> tuple[Edges, FaceIndices]:
 
 
 def edge_faces(face_edges: FaceIndices, n_edges: int) -> EdgeIndices:
-    """Return the faces at each edge (E, 2): second -1 on the boundary, both -1 where not manifold."""
+    """Return the faces at each edge (E, 2): the second is -1 at a boundary edge, both are -1 at a non-manifold edge."""
     flat = face_edges.ravel()
     order = np.argsort(flat, kind="stable")
     count = np.bincount(flat, minlength=n_edges)
@@ -42,7 +45,7 @@ def edge_faces(face_edges: FaceIndices, n_edges: int) -> EdgeIndices:
 
 
 def face_neighbours(face_edges: FaceIndices, edge_faces: EdgeIndices) -> FaceIndices:
-    """Return the face across the side opposite each corner (F, 3), -1 for none."""
+    """Return the face across each side (F, 3); -1 at boundary and non-manifold edges."""
     pairs = edge_faces[face_edges]
     own = np.arange(len(face_edges), dtype=np.int32)[:, None]
     across: FaceIndices = np.where(pairs[:, :, 0] == own, pairs[:, :, 1], pairs[:, :, 0]).astype(np.int32)
@@ -50,11 +53,7 @@ def face_neighbours(face_edges: FaceIndices, edge_faces: EdgeIndices) -> FaceInd
 
 
 def side_pairs(faces: Faces) -> npt.NDArray[np.int64]:
-    """Return pairs (n, 2) of sides that lie on the same edge.
-
-    Sides are numbered as the rows of :func:`half_edges`. An edge with two faces gives one pair, an edge with
-    ``k`` faces a chain of ``k - 1`` pairs.
-    """
+    """Return pairs (n, 2) of sides on the same edge; an edge with ``k`` faces gives ``k - 1`` pairs."""
     face_edges = edges_of(faces)[1].ravel()
     order = np.argsort(face_edges, kind="stable")
     same = face_edges[order[1:]] == face_edges[order[:-1]]
@@ -62,7 +61,7 @@ def side_pairs(faces: Faces) -> npt.NDArray[np.int64]:
 
 
 def side_ends(sides: npt.NDArray[np.integer]) -> tuple[npt.NDArray[np.int64], npt.NDArray[np.int64]]:
-    """Return the corners (numbered ``3 f + c``) at which these sides start and end."""
+    """Return the corners, numbered ``3 f + c``, at which sides of any shape start and end."""
     sides = np.asarray(sides, dtype=np.int64)
     face, corner = np.divmod(sides, 3)
     return 3 * face + (corner + 1) % 3, 3 * face + (corner + 2) % 3
@@ -71,40 +70,40 @@ def side_ends(sides: npt.NDArray[np.integer]) -> tuple[npt.NDArray[np.int64], np
 def corner_fans(faces: Faces, pairs: npt.NDArray[np.int64]) -> tuple[int, npt.NDArray[np.int32]]:
     """Group the corners of the faces into fans.
 
+    Two corners at the same point are in one fan if a path around the point connects their faces across glued sides.
+
     Parameters
     ----------
     faces
         Point indices (F, 3).
     pairs
-        Pairs (n, 2) of sides to glue, as from :func:`side_pairs`; the sides of a pair lie on the same edge, in
-        either direction.
+        Pairs (n, 2) of glued sides, as from :func:`side_pairs`: on the same edge, in either direction.
 
     Returns
     -------
     tuple
-        The number of fans and the fan of every corner (3F,). Two corners at the same point share a fan if one
-        can walk from one face to the other around that point, crossing glued sides only.
+        The number of fans and the fan of every corner (3F,).
     """
     corners = faces.ravel()
     start, end = side_ends(pairs)
-    same_way = corners[start[:, 0]] == corners[start[:, 1]]
+    same_direction = corners[start[:, 0]] == corners[start[:, 1]]
     rows = np.concatenate([start[:, 0], end[:, 0]])
     columns = np.concatenate(
-        [np.where(same_way, start[:, 1], end[:, 1]), np.where(same_way, end[:, 1], start[:, 1])],
+        [np.where(same_direction, start[:, 1], end[:, 1]), np.where(same_direction, end[:, 1], start[:, 1])],
     )
-    return _components(rows, columns, len(corners))
+    return graph_components(rows, columns, len(corners))
 
 
 def connected_components(faces: Faces, n_points: int) -> tuple[int, FaceLabels]:
-    """Return the number of components and the component of every face (F,); faces sharing a point connect."""
+    """Return the number of components and the component of every face (F,); faces with a common point connect."""
     rows, columns = faces[:, [0, 0]].ravel(), faces[:, [1, 2]].ravel()
-    _, labels = _components(rows, columns, n_points)
-    kept, face_labels = np.unique(labels[faces[:, 0]], return_inverse=True)
-    return len(kept), face_labels.astype(np.int32)
+    _, labels = graph_components(rows, columns, n_points)
+    used, face_labels = np.unique(labels[faces[:, 0]], return_inverse=True)
+    return len(used), face_labels.astype(np.int32)
 
 
 def euler_characteristic(faces: Faces) -> int:
-    """Return points - edges + faces, counting only the points that a face uses."""
+    """Return V - E + F, where V counts only points that are used by a face."""
     return len(np.unique(faces)) - len(edges_of(faces)[0]) + len(faces)
 
 
@@ -114,27 +113,26 @@ def count_nonmanifold_edges(faces: Faces) -> int:
 
 
 def nonmanifold_points(faces: Faces) -> Indices:
-    """Return the points whose faces do not form one fan.
+    """Return the points whose faces do not form a single fan.
 
-    These are the ends of edges with more than two faces, and points where several fans meet (two cones
-    touching at their tips).
+    These are the ends of edges with more than two faces and points where several fans meet.
     """
     edges, face_edges = edges_of(faces)
     n_fans, fans = corner_fans(faces, side_pairs(faces))
     point_of_fan = np.empty(n_fans, dtype=np.int64)
     point_of_fan[fans] = faces.ravel()
-    bad = np.bincount(point_of_fan) > 1
-    bad[edges[np.bincount(face_edges.ravel()) > 2]] = True
-    return np.flatnonzero(bad).astype(np.int32)
+    nonmanifold = np.bincount(point_of_fan) > 1
+    nonmanifold[edges[np.bincount(face_edges.ravel()) > 2]] = True
+    return np.flatnonzero(nonmanifold).astype(np.int32)
 
 
 def count_nonmanifold_points(faces: Faces) -> int:
-    """Return the number of points whose faces do not form one fan."""
+    """Return the number of points whose faces do not form a single fan."""
     return len(nonmanifold_points(faces))
 
 
 def is_oriented(faces: Faces) -> bool:
-    """Return whether every edge with exactly two faces is used once in each direction."""
+    """Return whether the faces are consistently oriented: each edge with two faces has one side in each direction."""
     face_edges = edges_of(faces)[1].ravel()
     sides = half_edges(faces)
     upward = (sides[:, 0] < sides[:, 1]).astype(np.int64)
@@ -143,13 +141,13 @@ def is_oriented(faces: Faces) -> bool:
 
 
 def boundary_loops(faces: Faces) -> list[Indices]:
-    """Return the boundary loops, each as its points in order, with the surface on the left.
+    """Return the boundary loops, each as a list of points in order, with the surface on the left.
 
     Notes
     -----
-    A boundary edge is an edge with one face. At a point where several fans meet a loop stays within its fan,
-    so that a point can occur in several loops or twice in one. On a surface that is not manifold a "loop" can
-    be an open chain, given without its last point; on one that is not oriented the direction is that of its first face.
+    Boundary edges have one face. Where several fans meet at a point, a loop stays within its fan, so that a point can
+    occur in several loops or twice in one. On a non-manifold surface a loop can be an open polyline, listed without its
+    last point; on an inconsistently oriented surface its first face determines the direction.
     """
     edges_at = edges_of(faces)[1].ravel()
     sides = np.flatnonzero(np.bincount(edges_at)[edges_at] == 1)
@@ -157,41 +155,42 @@ def boundary_loops(faces: Faces) -> list[Indices]:
         return []
     _, fans = corner_fans(faces, side_pairs(faces))
     start, end = side_ends(sides)
-    walks = _walks(fans[start], fans[end])
     ends = np.stack([faces.ravel()[start], faces.ravel()[end]], axis=1)
-    return [np.array([ends[side, way] for side, way in walk], dtype=np.int32) for walk in walks]
+    trails = _edge_trails(fans[start], fans[end])
+    return [np.array([ends[side, direction] for side, direction in trail], dtype=np.int32) for trail in trails]
 
 
-def _walks(tails: npt.NDArray[np.int32], heads: npt.NDArray[np.int32]) -> list[list[tuple[int, int]]]:
-    """Split a graph into walks of (edge, 0 along or 1 against it), closed wherever every degree is even."""
-    at: dict[int, list[tuple[int, int]]] = {}
+def _edge_trails(tails: npt.NDArray[np.int32], heads: npt.NDArray[np.int32]) -> list[list[tuple[int, int]]]:
+    """Split a graph into trails of (edge, 0 along or 1 against it), closed in components without odd degrees."""
+    incident: dict[int, list[tuple[int, int]]] = {}
     nodes = np.stack([tails, heads], axis=1).tolist()
     for edge, (tail, head) in enumerate(nodes):
-        at.setdefault(head, []).insert(0, (edge, 1))
-        at.setdefault(tail, []).append((edge, 0))
-    odd = [node for node, leaving in at.items() if len(leaving) % 2]
+        incident.setdefault(head, []).insert(0, (edge, 1))
+        incident.setdefault(tail, []).append((edge, 0))
+    odd = [node for node, edges in incident.items() if len(edges) % 2]
     used = [False] * len(nodes)
-    walks = []
+    trails = []
     for node in odd + tails.tolist():
-        walk: list[tuple[int, int]] = []
+        trail: list[tuple[int, int]] = []
         while True:
-            leaving = at[node]
-            while leaving and used[leaving[-1][0]]:
-                leaving.pop()
-            if not leaving:
+            edges = incident[node]
+            while edges and used[edges[-1][0]]:
+                edges.pop()
+            if not edges:
                 break
-            edge, way = leaving.pop()
+            edge, direction = edges.pop()
             used[edge] = True
-            walk.append((edge, way))
-            node = nodes[edge][1 - way]
-        if walk:
-            walks.append(walk)
-    return walks
+            trail.append((edge, direction))
+            node = nodes[edge][1 - direction]
+        if trail:
+            trails.append(trail)
+    return trails
 
 
-def _components(
+def graph_components(
     rows: npt.NDArray[np.integer], columns: npt.NDArray[np.integer], size: int
 ) -> tuple[int, npt.NDArray[np.int32]]:
+    """Return the number of components of an undirected graph with edges rows-columns, and the label of each node."""
     graph = sparse.coo_matrix((np.ones(len(rows), dtype=np.bool_), (rows, columns)), shape=(size, size))
     count, labels = csgraph.connected_components(graph, directed=False)
     return int(count), labels.astype(np.int32)

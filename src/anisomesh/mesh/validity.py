@@ -1,4 +1,7 @@
-"""Whether a remesh is a valid surface of the same kind as its input."""
+"""Validity of a remesh: its topology beside the input's, and its degenerate, inverted and intersecting triangles.
+
+Remeshing itself relies on these measures for its warnings and for removing self-intersections.
+"""
 
 from __future__ import annotations
 
@@ -24,30 +27,30 @@ from anisomesh.mesh.topology import (
 
 @dataclass(frozen=True, kw_only=True)
 class Validity:
-    """What a remesh is, topologically, and how many of its triangles are flat or face the wrong way.
+    """Topology of a remesh and of its input, and counts of defects of the remesh.
 
     Attributes
     ----------
     closed
         Whether every edge has two faces.
     boundary_loops, components, euler
-        Their numbers, and the Euler characteristic.
+        Number of boundary loops and of connected components, and Euler characteristic V - E + F.
     boundary_loops_input, components_input, euler_input
-        The same of the input.
+        The corresponding numbers of the input.
     duplicate_faces
-        Faces with the same three vertices as another.
+        Number of faces with the same three vertices as an earlier face.
     nonmanifold_edges, nonmanifold_vertices
-        Edges with more than two faces; vertices whose faces do not form one fan.
+        Number of edges with more than two faces, and of vertices whose faces do not form a single fan.
     oriented
-        Whether faces that share an edge agree on their side.
+        Whether faces that share an edge are consistently oriented.
     flat
         Number of triangles without area, see :func:`~anisomesh.mesh.geometry.is_flat`.
     inverted
         Number of triangles that face away from the input, see :func:`inverted_faces`.
     self_intersections, self_intersections_input
-        Pairs of triangles that intersect, see :func:`~anisomesh.mesh.intersections.self_intersections`.
+        Number of intersecting pairs, see :func:`~anisomesh.mesh.intersections.self_intersections`.
     new_intersections
-        Those of the remesh that are not at an intersection of the input, see :func:`new_intersections`.
+        Number of intersecting pairs of the remesh away from intersections of the input, see :func:`new_intersections`.
     """
 
     closed: bool
@@ -68,19 +71,19 @@ class Validity:
     new_intersections: int
 
     def as_dict(self) -> dict[str, Any]:
-        """Return the values under their names, for JSON."""
+        """Return a dictionary of all fields, for JSON."""
         return asdict(self)
 
 
 def check_validity(result: Surface, reference: Surface) -> Validity:
-    """Return the topology of a remesh, beside that of its input, and count its flat and inverted triangles.
+    """Compare the topology of a remesh with its input's and count its defects.
 
     Parameters
     ----------
     result
         The remesh.
     reference
-        The input it stands for, consistently oriented, in the same units.
+        Its prepared input, consistently oriented, in the same units.
     """
     pairs_input = self_intersections(reference)
     return Validity(
@@ -99,16 +102,16 @@ def check_validity(result: Surface, reference: Surface) -> Validity:
         inverted=int(inverted_faces(result, reference).sum()),
         self_intersections=len(self_intersections(result)),
         self_intersections_input=len(pairs_input),
-        new_intersections=len(new_intersections(result, _facets_of(reference, pairs_input))),
+        new_intersections=len(new_intersections(result, _search_tree(reference, pairs_input))),
     )
 
 
 def crossing_facets(reference: Surface) -> ClosestPoints | None:
-    """Return the facets of a surface that intersect others, for :func:`new_intersections`, None if there are none."""
-    return _facets_of(reference, self_intersections(reference))
+    """Return a search tree over the facets of a surface that intersect others, or None if there are none."""
+    return _search_tree(reference, self_intersections(reference))
 
 
-def _facets_of(surface: Surface, pairs: Pairs) -> ClosestPoints | None:
+def _search_tree(surface: Surface, pairs: Pairs) -> ClosestPoints | None:
     facets = np.unique(pairs)
     return ClosestPoints(Surface(surface.points, surface.faces[facets])) if len(facets) else None
 
@@ -116,32 +119,30 @@ def _facets_of(surface: Surface, pairs: Pairs) -> ClosestPoints | None:
 def new_intersections(result: Surface, crossing: ClosestPoints | None) -> Pairs:
     """Return the pairs of faces (n, 2) of a remesh that intersect where its input does not.
 
-    A pair stands for an intersection of the input if both triangles are no farther than their longest edge from
-    the facets of the input that intersect others, ``crossing``.
+    A pair is attributed to the input if the barycentres of both triangles are no farther than their longest edges from
+    the intersecting facets of the input, ``crossing`` (see :func:`crossing_facets`).
     """
     pairs = self_intersections(result)
     if len(pairs) == 0 or crossing is None:
         return pairs
-    faces, place = np.unique(pairs, return_inverse=True)
+    faces, position = np.unique(pairs, return_inverse=True)
     corners = result.points[result.faces[faces]]
     longest = np.linalg.norm(corners - corners[:, [1, 2, 0]], axis=2).max(axis=1)
     near = np.sqrt(crossing.squared_distances(corners.mean(axis=1))) <= longest
-    return np.asarray(pairs[~near[place.reshape(-1, 2)].all(axis=1)])
+    return np.asarray(pairs[~near[position.reshape(-1, 2)].all(axis=1)])
 
 
 def inverted_faces(result: Surface, reference: Surface) -> FaceMask:
-    """Return which triangles (F,) face away from the input where they are closest to it.
+    """Return which triangles (F,) of a remesh face away from its input.
 
-    A triangle is inverted if its normal has a negative dot product with the normal of the input at the point closest
-    to its barycentre. Inside a facet that is the facet's normal, on an edge the sum of the unit normals of the faces
-    there, at a point their sum weighted by the angles at the point. So on a crease or a corner, however sharp, the
-    choice among the facets that are equally close does not matter. A triangle without area is not inverted.
+    A triangle is inverted if its normal has a negative dot product with the pseudonormal of the input at the point
+    closest to its barycentre, see :meth:`ClosestPoints.normals`. The pseudonormal makes the result independent of
+    which of several equally close facets is found, at creases and corners too. Triangles without area are not inverted.
 
     Notes
     -----
-    Where a sheet is thinner than twice the distance between its one side and the triangles that stand for it, a
-    barycentre can be closer to the other side, and counts as inverted: the remesh really passes through it there.
-    A point counts as on a side of the facet when its barycentric coordinate is below 1e-6.
+    Where a part is thinner than twice the approximation error, the closest point can be on its opposite side, and the
+    triangle counts as inverted: the remesh passes through that side there.
 
     References
     ----------
