@@ -13,6 +13,7 @@ MADE = {
     "icosahedron": (shapes.sphere(0), 2, 0),
     "ellipsoid": (shapes.ellipsoid(subdivisions=2), 2, 0),
     "torus": (shapes.torus(n_major=9, n_minor=5), 0, 0),
+    "knot": (shapes.trefoil_knot(n_along=60, n_around=6), 0, 0),
     "smallest torus": (shapes.torus(n_major=3, n_minor=3), 0, 0),
     "cylinder": (shapes.cylinder(n_around=20, n_along=3), 2, 0),
     "thin cylinder": (shapes.cylinder(n_around=3, n_along=1), 2, 0),
@@ -49,6 +50,15 @@ def test_icosphere_and_torus_lie_on_their_surfaces():
     np.testing.assert_allclose(np.linalg.norm(shapes.sphere(3, radius=2.5).points, axis=1), 2.5, rtol=1e-14)
     x, y, z = shapes.torus(2, 0.3).points.T
     np.testing.assert_allclose(np.hypot(np.hypot(x, y) - 2, z), 0.3, rtol=1e-12)
+
+
+def test_the_knot_has_the_volume_of_a_tube_around_its_centre_line():
+    knot = shapes.trefoil_knot(0.3, 2000, 60)
+    length = np.linalg.norm(np.diff(knot.points.reshape(2000, 60, 3).mean(axis=1), axis=0, append=0)[:-1], axis=1).sum()
+    a, b, c = (knot.points[knot.faces[:, k]] for k in range(3))
+    volume = np.einsum("ij,ij->", a, np.cross(b, c)) / 6
+    section = 0.5 * 60 * np.sin(2 * np.pi / 60) * 0.3**2  # of the polygon of 60 corners
+    assert volume == pytest.approx(section * length, rel=2e-3)
 
 
 @pytest.mark.parametrize("n", [6, 12, 20])

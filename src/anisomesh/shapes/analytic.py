@@ -7,6 +7,7 @@ from collections.abc import Callable
 import numpy as np
 import numpy.typing as npt
 
+from anisomesh._arrays import Points
 from anisomesh.errors import OptionError
 from anisomesh.mesh import topology
 from anisomesh.mesh.geometry import unit
@@ -26,6 +27,7 @@ __all__ = [
     "sample",
     "sphere",
     "torus",
+    "trefoil_knot",
     "twisted_ring",
 ]
 
@@ -66,6 +68,23 @@ def torus(major: float = 1.0, minor: float = 0.35, n_major: int = 72, n_minor: i
     ring = major + minor * np.cos(v)
     points = np.stack([ring * np.cos(u), ring * np.sin(u), minor * np.sin(v)], axis=-1)
     return Surface(points.reshape(-1, 3), patches.grid_faces(n_major, n_minor, wrap_rows=True, wrap_columns=True))
+
+
+def trefoil_knot(radius: float = 0.3, n_along: int = 300, n_around: int = 20) -> Surface:
+    """Return a tube around a trefoil knot about 6 wide; it bends much around and little along."""
+    _at_least(3, n_along=n_along, n_around=n_around)
+    t, v = _turn(n_along), _turn(n_around)[:, None]
+
+    def centre_line(order: int) -> Points:
+        """Return the derivative of this order of (sin t + 2 sin 2t, cos t - 2 cos 2t, -sin 3t)."""
+        one, two, three = ((1j * k) ** order * np.exp(1j * k * t) for k in (1, 2, 3))
+        return np.stack([one.imag + 2 * two.imag, one.real - 2 * two.real, -three.imag], axis=-1)
+
+    tangent = centre_line(1)
+    binormal = unit(np.cross(tangent, centre_line(2)))
+    normal = unit(np.cross(binormal, tangent))
+    points = centre_line(0)[:, None] + radius * (np.cos(v) * normal[:, None] - np.sin(v) * binormal[:, None])
+    return Surface(points.reshape(-1, 3), patches.grid_faces(n_along, n_around, wrap_rows=True, wrap_columns=True))
 
 
 def cylinder(
@@ -162,6 +181,7 @@ SAMPLES: dict[str, Callable[[], Surface]] = {
     "part": lambda: cad_part(16),
     "ellipsoid": ellipsoid,
     "torus": torus,
+    "knot": trefoil_knot,
     "cylinder": cylinder,
     "sphere": lambda: sphere(4),
     "waves": lambda: open_patch(lambda x, y: 0.15 * np.sin(6 * x + 2 * y) * np.exp(-(x**2) - y**2), 60),
