@@ -11,7 +11,7 @@ import numpy.typing as npt
 from anisomesh._arrays import EmbeddedPoints, PointTensors
 from anisomesh.embedding.base import Embedding
 from anisomesh.embedding.direct import embed
-from anisomesh.embedding.precomputed import given_embedding
+from anisomesh.embedding.precomputed import precomputed_embedding
 from anisomesh.features.detect import share_of_flat_edges
 from anisomesh.learn import require_torch, torch_is_there
 from anisomesh.mesh.subdivision import Subdivision
@@ -113,7 +113,7 @@ def estimated(
 def embedded(estimate: Estimate, max_iterations: int) -> Embedding:
     """Return the embedding of an estimate: the one that a network has found, or by at most so many direct steps."""
     if estimate.extra is not None:
-        return given_embedding(estimate.working, estimate.extra, estimate.tensors)
+        return precomputed_embedding(estimate.working, estimate.extra, estimate.tensors)
     return embed(estimate.working, estimate.tensors, max_iterations=max_iterations)
 
 

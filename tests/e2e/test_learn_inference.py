@@ -133,7 +133,7 @@ def test_the_embedding_that_is_left_open_is_hybrid_for_the_curvature_metric(egg)
 def test_the_hybrid_metric_is_between_the_two(egg):
     options = {"n_vertices": 100, "max_iterations": 0}
     means = {
-        kind: anisomesh.remesh(egg, embedding=kind, **options).embedding.stretch.asked_mean
+        kind: anisomesh.remesh(egg, embedding=kind, **options).embedding.stretch.target_mean
         for kind in ("direct", "neural", "hybrid")
     }
     low, high = sorted([means["direct"], means["neural"]])

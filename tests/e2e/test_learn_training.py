@@ -349,7 +349,7 @@ def test_a_remesh_takes_the_metric_of_a_trained_network(files, tmp_path, run_cli
     np.testing.assert_allclose(result.working.points, found.points, atol=1e-6)
     stretch = np.sqrt(np.linalg.eigvalsh(found.tensors)[:, 2])
     assert stretch.mean() > 1.1
-    assert result.embedding.stretch.asked_mean == pytest.approx(stretch.mean(), rel=0.1)
+    assert result.embedding.stretch.target_mean == pytest.approx(stretch.mean(), rel=0.1)
     anisomesh.save(surface, tmp_path / "in.ply")
     words = ("remesh", tmp_path / "in.ply", "-o", tmp_path / "out.ply", "-n", 100, "--embedding", "neural")
     done = run_cli(*words, "--weights", weights)

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from anisomesh.embedding.base import EmbeddingStatus, achieved_stretch, asked_stretch
+from anisomesh.embedding.base import EmbeddingStatus, achieved_stretch, target_stretch
 from anisomesh.embedding.direct import embed
 from anisomesh.embedding.gradient import face_frames, face_gradient, face_tensors
 from anisomesh.errors import OptionError
@@ -130,16 +130,16 @@ def test_statistics_of_a_perfect_embedding():
     surface = open_patch(lambda x, y: 0.0 * x, n=6)
     tensors = np.tile(np.diag([9.0, 1.0, 1.0]), (surface.n_points, 1, 1))
     stretch = embed(surface, tensors).stretch
-    values = (stretch.asked_mean, stretch.asked_max, stretch.achieved_mean, stretch.achieved_max)
+    values = (stretch.target_mean, stretch.target_max, stretch.achieved_mean, stretch.achieved_max)
     np.testing.assert_allclose(values, 3.0)
     np.testing.assert_allclose((stretch.low, stretch.median, stretch.high), 1.0)
     assert stretch.log_error < 1e-9
 
 
-def test_asked_stretch_is_the_ratio_of_the_eigenvalues_in_the_plane():
+def test_target_stretch_is_the_ratio_of_the_eigenvalues_in_the_plane():
     surface, rotation = tilted(open_patch(lambda x, y: 0.0 * x, n=2))
     tensors = np.tile(rotation @ np.diag([2.0, 18.0, 1000.0]) @ rotation.T, (surface.n_points, 1, 1))
-    np.testing.assert_allclose(asked_stretch(face_tensors(surface, tensors, face_frames(surface))), 3.0)
+    np.testing.assert_allclose(target_stretch(face_tensors(surface, tensors, face_frames(surface))), 3.0)
 
 
 @pytest.mark.parametrize("options", [{"extra_dimensions": 2}, {"max_iterations": 0}, {"tolerance": -1.0}])

@@ -5,7 +5,7 @@ import pytest
 
 from anisomesh.embedding.base import EmbeddingStatus
 from anisomesh.embedding.direct import embed
-from anisomesh.embedding.precomputed import given_embedding, pulled_back_metric
+from anisomesh.embedding.precomputed import precomputed_embedding, pulled_back_metric
 from anisomesh.mesh.surface import Surface
 from anisomesh.metric.tensors import compute_metric
 from anisomesh.shapes.analytic import ellipsoid, open_patch
@@ -26,7 +26,7 @@ def test_lengths_of_edges_in_the_metric_are_those_in_the_embedding():
     start, end = surface.edges.T
     way, mean = surface.points[end] - surface.points[start], 0.5 * (tensors[start] + tensors[end])
     lengths = np.sqrt(np.einsum("ex,exy,ey->e", way, mean, way))
-    embedded = given_embedding(surface, extra, pulled_back_metric(surface, extra)).points
+    embedded = precomputed_embedding(surface, extra, pulled_back_metric(surface, extra)).points
     off = np.abs(lengths / np.linalg.norm(embedded[end] - embedded[start], axis=1) - 1.0)
     assert np.median(off) < 0.01
     assert off.max() < 0.15  # triangles are not small against the curvature at the rim
@@ -37,9 +37,9 @@ def test_the_metric_of_a_direct_embedding_comes_back():
     surface = surface.with_points(surface.points / surface.diagonal)
     direct = embed(surface, compute_metric(surface), max_iterations=30)
     extra = direct.points[:, 3:]
-    given = given_embedding(surface, extra, pulled_back_metric(surface, extra))
+    given = precomputed_embedding(surface, extra, pulled_back_metric(surface, extra))
     np.testing.assert_allclose(given.points, direct.points, atol=1e-6)
-    assert (given.status, given.iterations, given.scale) == (EmbeddingStatus.GIVEN, 0, 1.0)
+    assert (given.status, given.iterations, given.scale) == (EmbeddingStatus.PRECOMPUTED, 0, 1.0)
     assert given.stretch.log_error < 0.05
     assert given.stretch.achieved_mean == pytest.approx(direct.stretch.achieved_mean)
 

@@ -1,1 +1,1 @@
-"""Euclidean embeddings in which the distances of a metric are straight lengths."""
+"""Euclidean embeddings of a surface in which straight lengths are lengths in a metric."""

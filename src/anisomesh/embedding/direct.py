@@ -1,4 +1,4 @@
-"""The direct embedding: coordinates plus a few more that carry the metric, by local and global steps."""
+"""The direct embedding: extra coordinates that carry the metric, found by local and global steps."""
 
 from __future__ import annotations
 
@@ -13,8 +13,9 @@ from anisomesh.errors import OptionError
 from anisomesh.mesh.geometry import sums_at_points
 from anisomesh.mesh.surface import Surface
 
-_POSITION_SHARE = 0.01
-_INVARIANT_SHARE = 0.2
+_POSITION_WEIGHT = 0.01  # of the coordinates in the start, relative to unit normals; matters on flat parts only
+_INVARIANT_WEIGHT = 0.2  # of the invariant columns of the start; chosen on training meshes
+_MIN_ROOT_EIGENVALUE = 1e-12  # of T_f - c^2 I, over the largest of T_f: smaller ones are rounding errors, set to 0
 
 
 def embed(
@@ -30,35 +31,34 @@ def embed(
     Parameters
     ----------
     surface
-        The surface, scaled to bounding-box diagonal 1; it may be open, have several components or flat faces.
+        The surface at bounding-box diagonal 1; boundaries, several components and degenerate faces are allowed.
     tensors
         Symmetric positive definite metric (V, 3, 3).
     extra_dimensions
-        Number of coordinates beside the first three, at least 3.
+        Number of extra coordinates, at least 3.
     max_iterations
         Largest number of local/global steps.
     tolerance
-        Stop when a step lowers the residual by less than this part of it.
+        Relative decrease of the residual by a step below which the iteration stops.
 
     Returns
     -------
     embedding
-        Points (V, 3 + extra_dimensions) and how well they fit. The number of columns never depends on the metric.
+        Points (V, 3 + extra_dimensions) and their agreement with the metric.
 
     Raises
     ------
     OptionError
-        If there are fewer than 3 extra dimensions, no step, or a negative tolerance.
+        If ``extra_dimensions`` is below 3, ``max_iterations`` below 1, or ``tolerance`` negative.
 
     Notes
     -----
-    The embedding is [c xyz, Y]. On the plane of a face the metric T_f is the mean of the tensors at its corners;
-    c^2 is the smallest eigenvalue over all faces (1 for the paper's metric; 0.9 of it in the supplement, which
-    leaves more to Y for nothing), and Y carries T_f - c^2 I = S_f^2. Starting from the normals, a local step
-    rotates the wanted gradient S_f to the current one, R_f = polar factor of (grad Y S_f), and a global step finds
-    the Y whose gradient is closest to R_f S_f. Neither can raise the residual. The start makes the result turn
-    with the surface; the hundredth of xyz added to it matters on flat parts only, where normals say nothing.
-    Most is done after three steps; ten are the default because regular triangles (the plain CVT) gain until then.
+    The embedding is [c xyz, Y]. In the plane of a face the metric T_f is the mean of the tensors at the corners. c^2 is
+    the smallest eigenvalue of all faces (1 for the curvature metric; the supplement has 0.9 of it, which gives Y more
+    to carry without benefit), and Y carries T_f - c^2 I = S_f^2. From a start with the normals, a local step rotates
+    the target gradient S_f to the current one, R_f = polar factor of (grad Y S_f), and a global step finds the Y with
+    gradient closest to R_f S_f. Neither increases the residual. The start makes the result rotate with the surface.
+    Three steps reach most of the agreement; regular triangles (the plain CVT) gain up to the default of ten.
 
     References
     ----------
@@ -66,7 +66,7 @@ def embed(
     arbitrary smooth Riemannian metric", 2018. Sorkine, Alexa, "As-rigid-as-possible surface modeling", 2007.
     """
     if extra_dimensions < 3:
-        raise OptionError(f"extra_dimensions is {extra_dimensions}; expected at least 3, which hold the normals")
+        raise OptionError(f"extra_dimensions is {extra_dimensions}; expected at least 3, to start with the normals")
     if max_iterations < 1 or tolerance < 0.0:
         raise OptionError(
             f"max_iterations is {max_iterations} and tolerance {tolerance}; expected at least 1 step and 0 or more"
@@ -100,37 +100,38 @@ def initial_coordinates(
 
     Notes
     -----
-    Columns 0 to 2 turn with the surface: the point normals, plus a little of the coordinates, which decides only
-    where normals say nothing (flat parts). Columns 3 and 4 are invariant: the mean curvature, compressed by
-    arcsinh, and the logarithm of the volume factor of the metric; zeros instead would stay zeros. On training
-    meshes they lower the stretch error after five steps by roughly 10 % (curvature metric) and 25 % (approximation).
+    Columns 0 to 2 rotate with the surface: the point normals, plus a small multiple of the coordinates, which decides
+    on flat parts, where normals are constant. Columns 3 and 4 are invariant: the arcsinh of the mean curvature times
+    the root of the area, and the logarithm of the volume factor of the metric. Zero columns would stay zero. On
+    training meshes these two lower the stretch error after five steps by roughly 10 % (curvature metric) and 25 %
+    (approximation).
     """
     size = np.sqrt(surface.area) or 1.0
     start = np.zeros((surface.n_points, dimensions))
-    start[:, :3] = surface.point_normals + _POSITION_SHARE / size * surface.points
-    invariants = [np.arcsinh(size * mean_bend(surface, gradient)), 0.5 * np.linalg.slogdet(tensors)[1]]
+    start[:, :3] = surface.point_normals + _POSITION_WEIGHT / size * surface.points
+    invariants = [np.arcsinh(size * normal_divergence(surface, gradient)), 0.5 * np.linalg.slogdet(tensors)[1]]
     for column, values in zip(range(3, dimensions), invariants, strict=False):
-        start[:, column] = _INVARIANT_SHARE * values
+        start[:, column] = _INVARIANT_WEIGHT * values
     return start
 
 
-def mean_bend(surface: Surface, gradient: FaceGradient) -> PointScalars:
-    """Return the divergence of the point normals, twice the mean curvature (V,), averaged over the faces at a point."""
-    bend = (gradient.operator @ surface.point_normals).reshape(surface.n_faces, 2, 3)
-    divergence = gradient.areas * np.einsum("fkx,fkx->f", bend, gradient.frames)
+def normal_divergence(surface: Surface, gradient: FaceGradient) -> PointScalars:
+    """Return the divergence of the normals (V,), twice the mean curvature, as area-weighted mean at the points."""
+    components = (gradient.operator @ surface.point_normals).reshape(surface.n_faces, 2, 3)
+    divergence = gradient.areas * np.einsum("fkx,fkx->f", components, gradient.frames)
     total = sums_at_points(divergence, surface.faces, surface.n_points)
     areas = sums_at_points(gradient.areas, surface.faces, surface.n_points)
     return np.divide(total, areas, out=np.zeros_like(total), where=areas > 0.0)
 
 
 def _split(metric: FaceTensors, gradient: FaceGradient) -> tuple[float, FaceTensors]:
-    """Return the factor of the coordinates and the square roots (F, 2, 2) of what the extra ones must carry."""
+    """Return the factor c of the coordinates and the roots S_f (F, 2, 2) of the metric left to extra coordinates."""
     eigenvalues, vectors = eigen_2x2(metric)
-    if not gradient.solid.any():
+    if not gradient.regular.any():
         return 1.0, np.zeros_like(metric)
-    floor = float(eigenvalues[gradient.solid, 1].min())
-    rest = np.where(gradient.solid[:, None], eigenvalues - floor, 0.0)
-    rest[rest < 1e-12 * eigenvalues[:, :1]] = 0.0
+    floor = float(eigenvalues[gradient.regular, 1].min())
+    rest = np.where(gradient.regular[:, None], eigenvalues - floor, 0.0)
+    rest[rest < _MIN_ROOT_EIGENVALUE * eigenvalues[:, :1]] = 0.0
     root = (vectors * np.sqrt(rest)[:, None, :]) @ vectors.transpose(0, 2, 1)
     return float(np.sqrt(floor)), root
 

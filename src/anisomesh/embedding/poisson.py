@@ -1,4 +1,4 @@
-"""The area-weighted Poisson problem of the global step: one factorisation, many right-hand sides."""
+"""The Poisson problem of the global step: one sparse factorisation, many right-hand sides."""
 
 from __future__ import annotations
 
@@ -15,6 +15,7 @@ from anisomesh.mesh.surface import Surface
 from anisomesh.mesh.topology import connected_components
 
 Columns = npt.NDArray[np.float64]
+"""Right-hand sides or solutions as columns (n, k)."""
 Solve = Callable[[Columns], Columns]
 
 
@@ -24,9 +25,9 @@ def factorise(matrix: sparse.csc_matrix, order: npt.NDArray[np.int64]) -> Solve:
     Parameters
     ----------
     matrix
-        Symmetric positive definite, hence needs no pivoting.
+        Symmetric positive definite (V, V), so pivoting is not needed.
     order
-        The order of elimination (V,), see :func:`~anisomesh.embedding.ordering.nested_dissection`.
+        Elimination order (V,), see :func:`~anisomesh.embedding.ordering.nested_dissection`.
     """
     factor = linalg.splu(
         matrix[order][:, order].tocsc(), permc_spec="NATURAL", diag_pivot_thresh=0.0, options={"SymmetricMode": True}
@@ -41,16 +42,20 @@ def factorise(matrix: sparse.csc_matrix, order: npt.NDArray[np.int64]) -> Solve:
 
 
 def poisson_solver(surface: Surface, gradient: FaceGradient) -> Solve:
-    """Return the least-squares integrator: gradients (F, 2, k) to the functions (V, k) that match them best.
+    """Return a function that integrates gradients (F, 2, k): the functions (V, k) with the closest gradients.
 
-    The functions minimise the area integral of the squared difference between their gradient and the given one,
-    and have mean zero, weighted by area, over each connected component. Points without a face that has area get 0.
+    The functions minimise the area integral of the squared difference between their gradient and the target, and have
+    area-weighted mean zero on each connected component. Points without a regular face have value 0.
 
     Notes
     -----
-    The normal equations G^t A G y = G^t A g are singular, one constant per component. Adding a positive number to
-    one diagonal entry of each component makes them definite and does not change the solution: the right-hand side
-    sums to zero over a component, hence that entry of the solution is zero.
+    The normal equations G^t A G y = G^t A g are singular, with one constant per component. A positive number added to
+    one diagonal entry per component makes them definite without a change of the solution: the right-hand side has sum
+    zero over a component, so this entry of the solution is zero.
+
+    References
+    ----------
+    Yu et al., "Mesh editing with Poisson-based gradient field manipulation", 2004.
     """
     operator, weight = gradient.operator, np.repeat(gradient.areas, 2)
     adjoint = (sparse.diags(weight) @ operator).T.tocsr()
@@ -64,8 +69,8 @@ def poisson_solver(surface: Surface, gradient: FaceGradient) -> Solve:
     order = nested_dissection(surface.points, surface.edges)
     solve = factorise((matrix + sparse.diags(extra)).tocsc(), order)
     total = np.bincount(label, mass, minlength=count)
-    share = np.divide(mass, total[label], out=np.zeros_like(mass), where=mass > 0.0)
-    average = sparse.csr_matrix((share, (label, np.arange(surface.n_points))), shape=(count, surface.n_points))
+    fraction = np.divide(mass, total[label], out=np.zeros_like(mass), where=mass > 0.0)
+    average = sparse.csr_matrix((fraction, (label, np.arange(surface.n_points))), shape=(count, surface.n_points))
 
     def integrate(target: Columns) -> Columns:
         solution = solve(adjoint @ target.reshape(2 * surface.n_faces, -1))
@@ -75,16 +80,17 @@ def poisson_solver(surface: Surface, gradient: FaceGradient) -> Solve:
 
 
 def _components(surface: Surface, gradient: FaceGradient) -> tuple[npt.NDArray[np.int64], int]:
-    """Return the component of each point (V,), joined by faces that have area; other points are their own."""
-    solid = surface.faces[gradient.solid]
-    count, face_label = connected_components(solid, surface.n_points) if len(solid) else (0, np.empty(0, np.int32))
+    """Return the component (V,) of each point, connected by regular faces, and the number of components."""
+    faces = surface.faces[gradient.regular]
+    count, face_label = connected_components(faces, surface.n_points) if len(faces) else (0, np.empty(0, np.int32))
     label = np.full(surface.n_points, -1, dtype=np.int64)
-    label[solid] = face_label[:, None]
-    alone = np.flatnonzero(label < 0)
-    label[alone] = count + np.arange(len(alone))
-    return label, count + len(alone)
+    label[faces] = face_label[:, None]
+    isolated = np.flatnonzero(label < 0)
+    label[isolated] = count + np.arange(len(isolated))
+    return label, count + len(isolated)
 
 
 def _point_areas(surface: Surface, gradient: FaceGradient) -> npt.NDArray[np.float64]:
+    """Return a third of the area of the regular faces at each point (V,)."""
     areas = np.repeat(gradient.areas / 3.0, 3)
     return np.asarray(np.bincount(surface.faces.ravel(), areas, minlength=surface.n_points), dtype=np.float64)

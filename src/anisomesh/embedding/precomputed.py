@@ -1,4 +1,4 @@
-"""An embedding whose extra coordinates are given, as by a network, and the metric that it has."""
+"""Embeddings with precomputed extra coordinates, such as those of a network, and their metric."""
 
 from __future__ import annotations
 
@@ -11,8 +11,18 @@ from anisomesh.mesh.geometry import sums_at_points
 from anisomesh.mesh.surface import Surface
 
 
-def given_embedding(surface: Surface, extra: EmbeddedPoints, tensors: PointTensors) -> Embedding:
-    """Return the embedding [xyz, extra] of a surface, from extra coordinates (V, k) and the metric asked (V, 3, 3)."""
+def precomputed_embedding(surface: Surface, extra: EmbeddedPoints, tensors: PointTensors) -> Embedding:
+    """Return the embedding [xyz, extra] of a surface.
+
+    Parameters
+    ----------
+    surface
+        The surface.
+    extra
+        Extra coordinates (V, k), in units of the surface.
+    tensors
+        Target metric (V, 3, 3), for the statistics of the stretch only.
+    """
     points, gradient = np.concatenate([surface.points, extra], axis=1), face_gradient(surface)
     metric = face_tensors(surface, tensors, gradient.frames)
     return Embedding(
@@ -20,21 +30,21 @@ def given_embedding(surface: Surface, extra: EmbeddedPoints, tensors: PointTenso
         scale=1.0,
         residual=0.0,
         iterations=0,
-        status=EmbeddingStatus.GIVEN,
+        status=EmbeddingStatus.PRECOMPUTED,
         stretch=stretch_statistics(gradient, metric, points),
     )
 
 
 def pulled_back_metric(surface: Surface, extra: EmbeddedPoints) -> PointTensors:
-    """Return the metric (V, 3, 3) that lengths in the embedding [xyz, extra] are.
+    """Return the metric (V, 3, 3) that the embedding [xyz, extra] induces on the surface.
 
-    On a face it is the identity and the sum of g g^t over the gradients g of the extra coordinates (V, k), so 1 along
-    the normal; at a point the mean of the faces around it by area, the identity where there are none.
+    On a face it is the identity plus the sum of g g^t over the gradients g of the extra coordinates (V, k), so 1 along
+    the normal. At a point it is the area-weighted mean over the faces there; the identity without faces.
     """
     gradient = face_gradient(surface)
-    slopes = (gradient.operator @ extra).reshape(surface.n_faces, 2, -1)
-    in_space = np.einsum("fkx,fkc->fxc", gradient.frames, slopes)
-    weighted = gradient.areas[:, None, None] * (in_space @ in_space.transpose(0, 2, 1))
+    components = (gradient.operator @ extra).reshape(surface.n_faces, 2, -1)
+    gradients = np.einsum("fkx,fkc->fxc", gradient.frames, components)
+    weighted = gradient.areas[:, None, None] * (gradients @ gradients.transpose(0, 2, 1))
     total = sums_at_points(weighted, surface.faces, surface.n_points)
     area = sums_at_points(gradient.areas, surface.faces, surface.n_points)[:, None, None]
     return np.asarray(np.eye(3) + np.divide(total, area, out=np.zeros_like(total), where=area > 0.0))

@@ -11,7 +11,7 @@ from typing import Any
 
 import numpy as np
 
-from anisomesh._arrays import PointMask, Points, PointTensors
+from anisomesh._arrays import PointMask, PointTensors
 from anisomesh.embedding.direct import embed
 from anisomesh.errors import AnisomeshError, OptionError
 from anisomesh.learn.data.items import Item
@@ -19,7 +19,7 @@ from anisomesh.learn.data.recipe import Recipe
 from anisomesh.learn.data.remesher import REMESH_SECONDS, Remesher
 from anisomesh.learn.data.retriangulate import with_random_triangles
 from anisomesh.mesh.closest_points import ClosestPoints
-from anisomesh.mesh.geometry import Frame, thickness, unit_frame
+from anisomesh.mesh.geometry import thickness, unit_frame
 from anisomesh.mesh.surface import Surface
 from anisomesh.mesh.working_surface import working_surface
 from anisomesh.meshops.collapse import decimate
@@ -60,9 +60,7 @@ def require_packages(recipe: Recipe) -> None:
         raise OptionError("evening with tetwild needs the package pytetwild: pip install pytetwild")
 
 
-def items_of_mesh(
-    surface: Surface, recipe: Recipe, rng: np.random.Generator, remesher: Remesher
-) -> list[LabelledItem]:
+def items_of_mesh(surface: Surface, recipe: Recipe, rng: np.random.Generator, remesher: Remesher) -> list[LabelledItem]:
     """Return the items of a mesh: the even mesh first, then the variants.
 
     Parameters
@@ -101,16 +99,15 @@ def items_of_mesh(
         found = transfer_metric_roots(reference, roots, mesh.points)
         return found @ found, np.asarray(curvature.trusted[nearest])
 
+    items = [_even_item(clean, metric_on, recipe)]
     variants = _random_variants(clean, recipe, rng, remesher)
-    items = _items_on(clean, variants, metric_on, recipe)
+    items += [_item_on(kind, mesh, metric_on, recipe) for kind, mesh in variants.items()]
     if "given" in recipe.variants and even is not prepared:
         items += _input_items(prepared, recipe, rng)
     return items
 
 
-def items_of_blobs(
-    blobs: Blobs, recipe: Recipe, rng: np.random.Generator, remesher: Remesher
-) -> list[LabelledItem]:
+def items_of_blobs(blobs: Blobs, recipe: Recipe, rng: np.random.Generator, remesher: Remesher) -> list[LabelledItem]:
     """Return the items of an implicit shape, with its exact curvature at the points of each mesh.
 
     See :func:`items_of_mesh`; there is no input mesh.
@@ -128,9 +125,11 @@ def items_of_blobs(
         return curvature_metric(mesh, scaled), scaled.trusted
 
     clean = Surface(frame.to_unit(points), result.surface.faces)
-    variants = _random_variants(clean, recipe, rng, remesher)
-    projected = {kind: mesh.with_points(_projected(mesh.points, blobs, frame)) for kind, mesh in variants.items()}
-    return _items_on(clean, projected, metric_on, recipe)
+    items = [_even_item(clean, metric_on, recipe)]
+    for kind, mesh in _random_variants(clean, recipe, rng, remesher).items():
+        projected = frame.to_unit(blobs.project(frame.to_model(mesh.points)))
+        items.append(_item_on(kind, mesh.with_points(projected), metric_on, recipe))
+    return items
 
 
 def even_mesh(surface: Surface, recipe: Recipe, remesher: Remesher) -> Surface:
@@ -169,17 +168,15 @@ def _random_variants(
     return variants
 
 
-def _items_on(
-    clean: Surface, variants: dict[str, Surface], metric_on: MetricOnMesh, recipe: Recipe
-) -> list[LabelledItem]:
-    """Return the item of the even mesh and the items of its variants."""
+def _even_item(clean: Surface, metric_on: MetricOnMesh, recipe: Recipe) -> LabelledItem:
+    """Return the item of the even mesh, or raise UnsuitableError."""
     even = _item_on("even", clean, metric_on, recipe)
     residual, stretch = even.facts["residual"], even.facts["stretch"]
     if residual > recipe.max_residual:
         raise UnsuitableError(f"the residual of the embedding is {residual:.2f}, more than {recipe.max_residual}")
     if stretch < recipe.min_stretch:
         raise UnsuitableError(f"flat or round everywhere: the mean stretch is {stretch:.3f}")
-    return [even, *(_item_on(kind, mesh, metric_on, recipe) for kind, mesh in variants.items())]
+    return even
 
 
 def _item_on(kind: str, mesh: Surface, metric_on: MetricOnMesh, recipe: Recipe) -> LabelledItem:
@@ -189,7 +186,7 @@ def _item_on(kind: str, mesh: Surface, metric_on: MetricOnMesh, recipe: Recipe) 
         "points": mesh.n_points,
         "faces": mesh.n_faces,
         "residual": round(embedding.residual, 4),
-        "stretch": round(embedding.stretch.asked_mean, 4),
+        "stretch": round(embedding.stretch.target_mean, 4),
         "trusted": round(float(trusted.mean()), 4),
     }
     return LabelledItem(kind=kind, item=Item.of(mesh, tensors, embedding.points[:, 3:], trusted), facts=facts)
@@ -216,11 +213,6 @@ def _in_unit_frame(surface: Surface) -> Surface:
 def _regularity(surface: Surface) -> float:
     """Return the mean thickness of the triangles over the thickness of an equilateral one."""
     return float(thickness(surface.points[surface.faces]).mean()) / _EQUILATERAL_THICKNESS
-
-
-def _projected(points: Points, blobs: Blobs, frame: Frame) -> Points:
-    """Return the projections onto the shape of points in the frame."""
-    return frame.to_unit(blobs.project(frame.to_model(points)))
 
 
 def _tetwild_boundary(surface: Surface) -> Surface:
