@@ -11,7 +11,7 @@ import numpy as np
 
 import anisomesh
 from anisomesh.shapes.analytic import torus
-from anisomesh.viz import Panel, gallery
+from anisomesh.viz import Panel, PictureOptions, gallery
 
 
 def tube() -> anisomesh.Surface:
@@ -29,7 +29,7 @@ def main(out: str = "gallery.png") -> None:
     for name, (surface, n) in shapes.items():
         result = anisomesh.remesh(surface, n_vertices=n).surface
         panels.append(Panel(surface=result, name=name, note=f"{surface.n_points:,} -> {result.n_points:,} vertices"))
-    gallery(panels, out, columns=3, scale=2)
+    gallery(panels, out, columns=3, options=PictureOptions(scale=2))
     print(f"wrote {out}")
 
 

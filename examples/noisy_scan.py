@@ -11,7 +11,7 @@ import numpy as np
 
 import anisomesh
 from anisomesh.mesh.noise import with_noise
-from anisomesh.viz import Panel, gallery
+from anisomesh.viz import Panel, PictureOptions, gallery
 
 NOISE = 0.3  # mean edge lengths
 N_VERTICES = 1_500
@@ -27,7 +27,7 @@ def main(out: str = "noisy_scan.png") -> None:
         note = f"G {measured.shape.g_mean:.2f}, RMS {1e4 * measured.distance.rms:.0f}e-4 from the clean surface"
         panels.append(Panel(surface=result.surface, name=embedding, note=note))
         print(f"{embedding}: {note}")
-    gallery(panels, out, columns=3, scale=2)
+    gallery(panels, out, columns=3, options=PictureOptions(scale=2))
     print(f"wrote {out}")
 
 

@@ -9,9 +9,10 @@ import time
 
 import numpy as np
 import pytest
+import typer
 
 import anisomesh
-from anisomesh.cli.dataset import Variant
+from anisomesh.cli.dataset import app
 from anisomesh.errors import MeshFileError, OptionError
 from anisomesh.learn.data.build import build, sources_of
 from anisomesh.learn.data.items import load_item
@@ -167,7 +168,12 @@ def test_variants_and_no_variants_exclude_each_other(run_cli, folder, tmp_path):
     assert done.returncode == 2
     assert "either --variant or --no-variants" in done.stderr
     assert not (tmp_path / "out").exists()
+    unknown = run_cli("dataset", "build", folder, tmp_path / "out", "--variant", "melted")
+    assert unknown.returncode == 2
+    assert "'melted' is not one of given, decimated, stretched" in unknown.stderr
 
 
 def test_the_command_has_the_variants_of_a_recipe():
-    assert tuple(kind.value for kind in Variant) == VARIANTS
+    command = typer.main.get_command(app).commands["build"]
+    (variant,) = (parameter for parameter in command.params if parameter.name == "variant")
+    assert tuple(variant.metavar.split("|")) == VARIANTS

@@ -7,7 +7,7 @@ import pytest
 from PIL import Image
 
 from anisomesh import AnisomeshError, OptionError, Surface
-from anisomesh.viz import Cells, renderer, require_renderer, side_by_side, triangle_stretch
+from anisomesh.viz import CellPolygons, renderer, require_renderer, side_by_side, triangle_stretch
 from conftest import torus_arrays
 
 TITLES = ("same", "same", "cells")
@@ -69,7 +69,7 @@ def test_values_without_a_range_are_drawn(torus, tmp_path, values):
 
 
 def test_cells_get_a_third_panel_of_many_colours(torus, tmp_path):
-    cells = Cells(
+    cells = CellPolygons(
         points=torus.points,
         offsets=3 * np.arange(torus.n_faces + 1),
         corners=torus.faces.ravel(),

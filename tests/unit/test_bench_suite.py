@@ -3,7 +3,7 @@
 import pytest
 
 from anisomesh.bench.inputs import inputs_of, make_shape
-from anisomesh.bench.suite import load_suite, parse_suite, shipped_suites
+from anisomesh.bench.suite import load_suite, parse_suite, suite_names
 from anisomesh.errors import OptionError
 from anisomesh.learn.inference.pretrained import shipped_weights
 from anisomesh.options import RemeshOptions
@@ -12,7 +12,7 @@ LEARNING = ("ablation-loss", "ablation-laplacian")
 TABLE = {"shapes": ["sphere:100"], "methods": [{"name": "ours", "method": "anisomesh"}]}
 
 
-@pytest.mark.parametrize("name", shipped_suites())
+@pytest.mark.parametrize("name", suite_names())
 def test_shipped_suites_load_and_their_shapes_and_options_exist(name):
     suite = load_suite(name)
     assert suite.name == name
@@ -27,13 +27,13 @@ def test_shipped_suites_load_and_their_shapes_and_options_exist(name):
 
 def test_all_suites_of_the_paper_are_there():
     plain = {"smoke", "table1", "rocker-fertility", "zeroshot", "torus", "timing", "noise", "neural", "networks"}
-    assert set(shipped_suites()) >= plain | set(LEARNING)
+    assert set(suite_names()) >= plain | set(LEARNING)
 
 
 def test_networks_that_shipped_suites_name_come_with_the_package():
     named = {
         method.options["weights"]
-        for name in shipped_suites()
+        for name in suite_names()
         for method in load_suite(name).methods
         if "weights" in method.options
     }

@@ -5,7 +5,7 @@ import pytest
 
 import anisomesh
 from anisomesh.mesh.surface import Surface
-from anisomesh.viz.cells import Cells, voronoi_cells
+from anisomesh.viz.cells import CellPolygons, voronoi_cells
 from conftest import torus_arrays
 
 
@@ -17,7 +17,9 @@ def squares(n, labels, shared):
     points = np.stack([x, y, 0 * x], axis=1).astype(float)
     if not shared:
         points, corners = points[corners.ravel()], np.arange(4 * n * n)
-    return Cells(points=points, offsets=4 * np.arange(n * n + 1), corners=corners.ravel(), labels=np.asarray(labels))
+    return CellPolygons(
+        points=points, offsets=4 * np.arange(n * n + 1), corners=corners.ravel(), labels=np.asarray(labels)
+    )
 
 
 @pytest.mark.parametrize("shared", [True, False])

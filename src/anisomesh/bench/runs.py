@@ -29,7 +29,7 @@ KEYS = ("mesh", "input", "ratio", "method", "seed")
 
 
 @dataclass(frozen=True)
-class Progress:
+class SuiteProgress:
     """What has just been done: its row, which of how many it was, and the seconds left if the rest is alike."""
 
     row: RunRow
@@ -44,7 +44,7 @@ def run_suite(
     *,
     data: Path | None = None,
     items: Path | None = None,
-    on_row: Callable[[Progress], None] = lambda progress: None,
+    on_row: Callable[[SuiteProgress], None] = lambda progress: None,
     on_epoch: Callable[[str], None] = lambda text: None,
 ) -> list[RunRow]:
     """Run what is not yet in a file of rows and return all rows of the suite.
@@ -96,7 +96,7 @@ def run_suite(
             append_line(out, json.dumps(row, default=_plain, allow_nan=False))
         known[job.key] = row
         left = (time.monotonic() - start) / number * (len(jobs) - number)
-        on_row(Progress(row, number, len(jobs), left))
+        on_row(SuiteProgress(row, number, len(jobs), left))
     return [known[job.key] for job in _jobs(suite, inputs)]
 
 

@@ -84,7 +84,7 @@ class Suite:
             check_disturbance(f"{self.name}: inputs", name)
 
 
-def shipped_suites() -> list[str]:
+def suite_names() -> list[str]:
     """Return the names of the suites that come with the package."""
     folder = resources.files("anisomesh.bench") / "suites"
     return sorted(entry.name.removesuffix(".toml") for entry in folder.iterdir() if entry.name.endswith(".toml"))
@@ -98,14 +98,14 @@ def load_suite(name: str) -> Suite:
     OptionError
         If there is no such suite, or the file has an error; the message says where, and what was meant.
     """
-    if name in shipped_suites():
+    if name in suite_names():
         text = (resources.files("anisomesh.bench") / "suites" / f"{name}.toml").read_text(encoding="utf-8")
     elif name.endswith(".toml") and Path(name).is_file():
         text = Path(name).read_text(encoding="utf-8")
     else:
-        meant = hint(name, shipped_suites())
+        meant = hint(name, suite_names())
         raise OptionError(
-            f"there is no suite {name!r}{meant}; expected one of {', '.join(shipped_suites())}, or a .toml file"
+            f"there is no suite {name!r}{meant}; expected one of {', '.join(suite_names())}, or a .toml file"
         )
     return parse_suite(Path(name).stem, parse_toml(name, text))
 

@@ -1,55 +1,149 @@
-"""Arguments that several commands have: the input, how to remesh it, threads, silence."""
+"""Arguments that several commands share: the input, the options of a remesh, silence."""
 
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
 from dataclasses import dataclass
-from enum import StrEnum
+from functools import partial
+from inspect import Parameter, Signature, signature
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import TYPE_CHECKING, Annotated, Any, TypeVar
 
 import typer
+
+from anisomesh.metric.names import MetricName
+from anisomesh.options import DeviceName, EmbeddingName, RemeshOptions
 
 if TYPE_CHECKING:
     from anisomesh.mesh.surface import Surface
 
-
-class Metric(StrEnum):
-    """What decides the shape of the triangles."""
-
-    curvature = "curvature"
-    approximation = "approximation"
-    uniform = "uniform"
+DEFAULTS = RemeshOptions()
+_option = partial(typer.Option, rich_help_panel="Remeshing")
+_Command = TypeVar("_Command", bound=Callable[..., None])
 
 
 def positive(value: float | None) -> float | None:
-    """Return the value of an option that is a positive number, if given.
+    """Return the value of an option unless it is not a positive finite number.
 
     Raises
     ------
     typer.BadParameter
-        If it is not.
+        If the value is given and is not a positive finite number.
     """
     if value is not None and not (math.isfinite(value) and value > 0):
         raise typer.BadParameter(f"{value} is not a positive finite number")
     return value
 
 
+REMESH_OPTIONS: dict[str, Any] = {
+    "metric": Annotated[
+        MetricName,
+        _option(
+            help="curvature: stretched along small curvature, as in the paper; approximation: least distance from the "
+            "input; uniform: equilateral triangles."
+        ),
+    ],
+    "sharpness": Annotated[
+        float,
+        _option(
+            callback=positive,
+            help="Weight of the normals, from 1: 1 ignores creases, 7 as in the paper, more keeps them more exactly.",
+        ),
+    ],
+    "final_sharpness": Annotated[
+        float | None,
+        _option(
+            callback=positive,
+            help="Finish the optimisation with this sharpness; 30 moves vertices onto corners and creases.",
+        ),
+    ],
+    "feature_angle": Annotated[
+        float,
+        _option(
+            min=0.0,
+            max=180.0,
+            help="Edges of the input that bend by more than this many degrees are creases; 180 for no creases.",
+        ),
+    ],
+    "embedding": Annotated[
+        EmbeddingName,
+        _option(
+            help="Source of the metric. direct: measured curvature; neural: a network; hybrid: the mean of both; auto: "
+            "hybrid if torch is installed and the metric is curvature, else direct."
+        ),
+    ],
+    "weights": Annotated[
+        str | None,
+        _option(
+            metavar="FILE",
+            help="Network to use: a file written by anisomesh train, or the name of a pretrained network.",
+        ),
+    ],
+    "device": Annotated[DeviceName, _option(help="Where the network runs.")],
+    "denoise": Annotated[
+        bool,
+        _option("--denoise/--keep-noise", help="Remove the noise that the network finds, or keep it."),
+    ],
+    "seed": Annotated[
+        int,
+        _option(min=0, help="Seed of the initial sites; the same seed and input give the same result."),
+    ],
+    "threads": Annotated[int, _option(min=1, help="Worker threads; they do not change the result.")],
+    "time_limit": Annotated[
+        float | None,
+        _option(
+            callback=positive,
+            metavar="SECONDS",
+            help="Stop the optimisation after this time and finish with the result so far.",
+        ),
+    ],
+}
+"""Types, checks and help texts of the fields of :class:`RemeshOptions` that commands offer."""
+
+COMMON_REMESH_OPTIONS = ("metric", "sharpness", "final_sharpness", "seed", "threads")
+
+
+def takes_remesh_options(*names: str) -> Callable[[_Command], _Command]:
+    """Return a decorator that adds remesh options to a command, which gets them as keyword arguments ``**options``.
+
+    Parameters
+    ----------
+    *names
+        Keys of :data:`REMESH_OPTIONS`. Defaults are those of :class:`RemeshOptions`.
+
+    Notes
+    -----
+    typer reads the parameters of a command from its signature, so the decorator extends the signature.
+    """
+
+    def decorate(command: _Command) -> _Command:
+        own = [p for p in signature(command, eval_str=True).parameters.values() if p.kind is not Parameter.VAR_KEYWORD]
+        added = [
+            Parameter(name, Parameter.KEYWORD_ONLY, default=getattr(DEFAULTS, name), annotation=REMESH_OPTIONS[name])
+            for name in names
+        ]
+        command.__signature__ = Signature([*own, *added])  # type: ignore[attr-defined]
+        return command
+
+    return decorate
+
+
 @dataclass(frozen=True)
 class Length:
-    """A length in model units, or in per cent of the diagonal of the bounding box of the mesh."""
+    """A length in model units, or in per cent of the bounding-box diagonal of the mesh."""
 
     value: float
     relative: bool
 
     @classmethod
     def parse(cls, text: str, option: str) -> Length:
-        """Return the length that a text such as ``0.2`` or ``0.1%`` stands for.
+        """Return the length in a text such as ``0.2`` or ``0.1%``.
 
         Raises
         ------
         typer.BadParameter
-            If it is no positive number.
+            If the text is not a positive finite number, with or without a per cent sign.
         """
         try:
             value = float(text.removesuffix("%"))
@@ -65,37 +159,10 @@ class Length:
         return self.value / 100.0 * surface.diagonal if self.relative else self.value
 
 
-def remesh_options(
-    metric: Metric, sharpness: float, final_sharpness: float | None, seed: int, threads: int
-) -> dict[str, Any]:
-    """Return the keyword arguments of :func:`anisomesh.pipeline.remesh` for these options."""
-    return {
-        "metric": metric.value,
-        "sharpness": sharpness,
-        "final_sharpness": final_sharpness,
-        "seed": seed,
-        "threads": threads,
-    }
-
-
 Source = Annotated[Path, typer.Argument(metavar="IN", help="Mesh to remesh: OBJ, OFF, PLY, STL, GLB, VTU, ...")]
 Vertices = Annotated[int | None, typer.Option("--vertices", "-n", min=4, help="Number of vertices of the result.")]
 Ratio = Annotated[
     float | None,
     typer.Option("--ratio", callback=positive, help="Vertices of the result per vertex of the repaired input."),
 ]
-MetricName = Annotated[
-    Metric, typer.Option("--metric", help="curvature: the paper's; approximation: least error; uniform: no stretch.")
-]
-Sharpness = Annotated[
-    float, typer.Option("--sharpness", callback=positive, help="Pull towards creases: 1 none, 7 as in the paper.")
-]
-FinalSharpness = Annotated[
-    float | None,
-    typer.Option(
-        "--final-sharpness", callback=positive, help="Raise the sharpness to this value late, for example 30."
-    ),
-]
-Seed = Annotated[int, typer.Option("--seed", min=0, help="Seed of the random start; same seed, same result.")]
-Threads = Annotated[int, typer.Option("--threads", min=1, help="Worker threads; the result does not depend on it.")]
 Quiet = Annotated[bool, typer.Option("--quiet", "-q", help="No progress and no summary.")]

@@ -1,4 +1,4 @@
-"""``anisomesh benchmark``: run a suite, go on where it was, write rows and reports."""
+"""``anisomesh benchmark``: run or resume a suite, write rows and reports."""
 
 from __future__ import annotations
 
@@ -12,34 +12,37 @@ import typer
 from anisomesh.cli.progress import announce_compilation, progress
 
 if TYPE_CHECKING:
-    from anisomesh.bench.runs import Progress, RunRow
+    from anisomesh.bench.runs import RunRow, SuiteProgress
     from anisomesh.bench.suite import Suite
 
 
 def command(
     suite: Annotated[
-        str | None, typer.Argument(metavar="SUITE", help="Name of a suite that comes with anisomesh, or a .toml file.")
+        str | None,
+        typer.Argument(metavar="SUITE", help="Name of a suite of the package (see --list), or a .toml file."),
     ] = None,
     out: Annotated[Path, typer.Option("--out", "-o", help="Folder for rows and reports.")] = Path("benchmark"),
     data: Annotated[
         Path | None,
-        typer.Option(envvar="ANISOMESH_DATA", help="Folder that the mesh patterns of the suite refer to."),
+        typer.Option(envvar="ANISOMESH_DATA", help="Folder of the mesh files of the suite."),
     ] = None,
     items: Annotated[
-        Path | None, typer.Option(help="Data set, for suites that train networks: see anisomesh dataset build.")
+        Path | None, typer.Option(help="Data set for suites that train networks; anisomesh dataset build makes one.")
     ] = None,
     ratios: Annotated[
         list[float] | None,
-        typer.Option("--ratio", help="Only this share of the vertices, not all of the suite; may be given again."),
+        typer.Option(
+            "--ratio", help="Run only this ratio (result vertices per input vertex), not all of the suite; repeatable."
+        ),
     ] = None,
     show_list: Annotated[bool, typer.Option("--list", help="List the suites and exit.")] = False,
     quiet: Annotated[bool, typer.Option("--quiet", "-q", help="No progress.")] = False,
 ) -> None:
-    """Run a SUITE of methods on meshes; a run that was stopped goes on where it was."""
-    from anisomesh.bench.suite import load_suite, shipped_suites
+    """Run a SUITE of methods on meshes. A stopped run is resumed by the same command."""
+    from anisomesh.bench.suite import load_suite, suite_names
 
     if show_list:
-        for name in shipped_suites():
+        for name in suite_names():
             typer.echo(f"{name:<18} {load_suite(name).description.strip().splitlines()[0]}")
         return
     if suite is None:
@@ -74,7 +77,7 @@ def command(
 
 
 def _chart(suite: Suite, rows: list[RunRow]) -> str:
-    """Return the chart of the report, nothing where it cannot be drawn."""
+    """Return the chart of the report as SVG, empty if matplotlib is missing."""
     from anisomesh.bench.charts import trade_off
 
     try:
@@ -84,7 +87,7 @@ def _chart(suite: Suite, rows: list[RunRow]) -> str:
         return ""
 
 
-def _print(step: Progress) -> None:
+def _print(step: SuiteProgress) -> None:
     row = step.row
     name = f"{Path(row['mesh']).name[:32]:<32} {row['ratio']:>4.0%} {row['input']:<9} {row['method']:<20}"
     if row["status"] == "done":

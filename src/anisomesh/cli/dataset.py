@@ -1,10 +1,9 @@
-"""``anisomesh dataset``: build a data set of a folder of meshes, and say what is in one."""
+"""``anisomesh dataset``: build a data set from a folder of meshes, and describe a data set."""
 
 from __future__ import annotations
 
 import sys
 from collections import Counter
-from enum import StrEnum
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
@@ -12,56 +11,59 @@ import typer
 
 from anisomesh.cli.progress import announce_compilation, progress
 from anisomesh.cli.report import counted, table
+from anisomesh.learn.data.recipe import VARIANTS, EveningName, Recipe
 
 if TYPE_CHECKING:
     from anisomesh.learn.data.manifest import ManifestRow
 
 
-class Variant(StrEnum):
-    """Other meshes of a shape."""
-
-    given = "given"
-    decimated = "decimated"
-    stretched = "stretched"
+DEFAULT_RECIPE = Recipe()
 
 
-class Evening(StrEnum):
-    """How meshes are made even."""
+def _known_variants(names: list[str] | None) -> list[str] | None:
+    for name in names or ():
+        if name not in VARIANTS:
+            raise typer.BadParameter(f"{name!r} is not one of {', '.join(VARIANTS)}")
+    return names
 
-    cvt = "cvt"
-    tetwild = "tetwild"
 
-
-app = typer.Typer(help="Data sets that a network learns the metric from.", no_args_is_help=True)
+app = typer.Typer(help="Build and describe data sets for training networks.", no_args_is_help=True)
 
 
 @app.command("build")
 def build_command(
     source: Annotated[Path, typer.Argument(metavar="SRC", help="Folder of meshes.")],
-    out: Annotated[Path, typer.Argument(metavar="OUT", help="Folder of the data set; made if it is not there.")],
-    target: Annotated[int, typer.Option(min=100, help="Points of the even mesh of a shape.")] = 5_000,
-    blobs: Annotated[int, typer.Option(min=0, help="Smooth shapes made by code, with exact curvature, besides.")] = 40,
-    parts: Annotated[int, typer.Option(min=0, help="Machine parts made by code besides.")] = 40,
+    out: Annotated[Path, typer.Argument(metavar="OUT", help="Folder of the data set; created if missing.")],
+    target: Annotated[int, typer.Option(min=100, help="Vertices of the even mesh of a shape.")] = DEFAULT_RECIPE.target,
+    blobs: Annotated[int, typer.Option(min=0, help="Number of procedural smooth shapes, with exact curvature.")] = 40,
+    parts: Annotated[int, typer.Option(min=0, help="Number of procedural machine parts.")] = 40,
     variant: Annotated[
-        list[Variant] | None,
-        typer.Option(help="Meshes of every shape beside the even one; may be given again.", show_default="all"),
+        list[str] | None,
+        typer.Option(
+            callback=_known_variants,
+            metavar="|".join(VARIANTS),
+            help="Other mesh of every shape besides the even one; repeatable.",
+            show_default="all",
+        ),
     ] = None,
     no_variants: Annotated[bool, typer.Option("--no-variants", help="Even meshes only.")] = False,
     evening: Annotated[
-        Evening, typer.Option(help="cvt: a uniform remesh; tetwild: pytetwild before it.")
-    ] = Evening.cvt,
-    validation: Annotated[float, typer.Option(min=0.0, max=0.9, help="Share of the families for validation.")] = 0.12,
-    workers: Annotated[int, typer.Option(min=1, help="Meshes worked on at once.")] = 2,
+        EveningName,
+        typer.Option(help="How to make meshes even. cvt: uniform remesh; tetwild: pytetwild, then a uniform remesh."),
+    ] = DEFAULT_RECIPE.evening,
+    validation: Annotated[
+        float, typer.Option(min=0.0, max=0.9, help="Share of the shape families for validation.")
+    ] = 0.12,
+    workers: Annotated[int, typer.Option(min=1, help="Number of meshes processed in parallel.")] = 2,
     quiet: Annotated[bool, typer.Option("--quiet", "-q", help="No progress.")] = False,
 ) -> None:
-    """Make training items of the meshes of SRC in OUT; a build that was stopped goes on where it was."""
+    """Build a data set from the meshes in SRC. A stopped build is resumed by the same command."""
     from anisomesh.learn.data.build import build, sources_of
-    from anisomesh.learn.data.recipe import Recipe
 
     if no_variants and variant:
         raise typer.BadParameter("give either --variant or --no-variants")
-    variants = () if no_variants else tuple(kind.value for kind in Variant if kind in (variant or Variant))
-    recipe = Recipe(target=target, variants=variants, evening=evening.value)
+    variants = () if no_variants else tuple(kind for kind in VARIANTS if kind in (variant or VARIANTS))
+    recipe = Recipe(target=target, variants=variants, evening=evening)
     sources = sources_of(source, blobs, parts)
     with progress(quiet) as display:
         announce_compilation(display, "remesh")
@@ -72,7 +74,7 @@ def build_command(
 
 @app.command("info")
 def info_command(folder: Annotated[Path, typer.Argument(metavar="DATASET", help="Folder of a data set.")]) -> None:
-    """Say what is in a data set, and what was left out of it and why."""
+    """Describe a data set, and the shapes that were dropped or failed, with the reason."""
     from anisomesh.errors import MeshFileError
     from anisomesh.learn.data.manifest import MANIFEST, read_manifest
 
@@ -106,4 +108,4 @@ def _print(row: ManifestRow, number: int, total: int) -> None:
 
 
 def _ignore(row: ManifestRow, number: int, total: int) -> None:
-    """Say nothing."""
+    """Print nothing."""

@@ -1,4 +1,4 @@
-"""``anisomesh evaluate``: how good a remesh of a surface is."""
+"""``anisomesh evaluate``: measure a remesh against its input."""
 
 from __future__ import annotations
 
@@ -17,12 +17,12 @@ if TYPE_CHECKING:
 
 def command(
     reference: Annotated[Path, typer.Argument(metavar="REFERENCE", help="The mesh that was remeshed.")],
-    result: Annotated[Path, typer.Argument(metavar="RESULT", help="The remesh, in the same units and place.")],
-    samples: Annotated[int, typer.Option(min=1, help="Points drawn on each surface.")] = 100_000,
+    result: Annotated[Path, typer.Argument(metavar="RESULT", help="The remesh, in the same coordinates.")],
+    samples: Annotated[int, typer.Option(min=1, help="Random points on each surface.")] = 100_000,
     crease_angle: Annotated[
-        float, typer.Option(min=0.0, max=180.0, help="Edges with a larger angle, in degrees, are creases.")
+        float, typer.Option(min=0.0, max=180.0, help="Edges that bend by more than this many degrees are creases.")
     ] = 30.0,
-    seed: Annotated[int, typer.Option(min=0, help="Seed of the points: same seed, same figures.")] = 0,
+    seed: Annotated[int, typer.Option(min=0, help="Seed of the points; the same seed gives the same figures.")] = 0,
     json_: Annotated[bool, typer.Option("--json", help="Print the figures as JSON and nothing else.")] = False,
 ) -> None:
     """Measure distance, triangle quality, features and validity of RESULT against REFERENCE."""
@@ -37,11 +37,11 @@ def command(
         typer.echo(as_json(names | evaluation.as_dict()))
     else:
         typer.echo(f"{result} against {reference}; lengths at bounding-box diagonal 1 of the reference")
-        typer.echo(text(evaluation))
+        typer.echo(_text(evaluation))
 
 
-def text(evaluation: Evaluation) -> str:
-    """Return the figures as lines for people, the paper's in the paper's units."""
+def _text(evaluation: Evaluation) -> str:
+    """Return the figures as readable lines, with the measures of the paper in the paper's units."""
     distance, shape, features = evaluation.distance, evaluation.shape, evaluation.features
     rows = [
         ("size", f"{counted(evaluation.vertices, 'vertex', 'vertices')}, {counted(evaluation.faces, 'triangle')}"),
@@ -51,10 +51,11 @@ def text(evaluation: Evaluation) -> str:
         ("  from input", f"RMS {distance.rms_ab:.3g}, largest {distance.max_ab:.3g}"),
         ("  to input", f"RMS {distance.rms_ba:.3g}, largest {distance.max_ba:.3g}"),
         ("  of vertices", f"RMS {evaluation.vertex_rms:.3g}, largest {evaluation.vertex_max:.3g}"),
-        ("quality G", f"mean {shape.g_mean:.3f}, 5 % below {shape.g_low:.3f}, least {shape.g_min:.3f}"),
+        ("quality G", f"mean {shape.g_mean:.3f}, 5 % below {shape.g_low:.3f}, smallest {shape.g_min:.3f}"),
         (
             "angles",
-            f"least {shape.angle_min:.1f}, 5 % of triangles below {shape.angle_low:.1f}, largest {shape.angle_max:.1f}",
+            f"smallest {shape.angle_min:.1f}, 5 % of triangles below {shape.angle_low:.1f}, "
+            f"largest {shape.angle_max:.1f} degrees",
         ),
         (
             "edges",
@@ -64,14 +65,14 @@ def text(evaluation: Evaluation) -> str:
         ("creases", f"{features.crease_covered:.1%} of length {features.crease_length:.3g} covered"),
         ("corners", f"{features.corners_kept:,} of {features.corners:,} kept"),
         ("boundary", _boundary(evaluation)),
-        ("samples", "  ".join(f"{name:>10}" for name in PAPER)),
-        ("  measured", "  ".join(f"{_paper(evaluation.sampled.as_dict(), name):>10}" for name in PAPER)),
-        ("  floor", "  ".join(f"{_paper(evaluation.floor.as_dict(), name):>10}" for name in PAPER)),
+        ("samples", "  ".join(f"{name:>10}" for name in PAPER_MEASURES)),
+        ("  measured", "  ".join(f"{_paper(evaluation.sampled.as_dict(), name):>10}" for name in PAPER_MEASURES)),
+        ("  floor", "  ".join(f"{_paper(evaluation.floor.as_dict(), name):>10}" for name in PAPER_MEASURES)),
     ]
     return table(rows)
 
 
-PAPER = {
+PAPER_MEASURES = {
     "CD x1e-5": ("chamfer", 1e5),
     "F1": ("f1", 1.0),
     "NC": ("normal_consistency", 1.0),
@@ -79,21 +80,21 @@ PAPER = {
     "ECD x1e-2": ("edge_chamfer", 1e2),
     "EF1": ("edge_f1", 1.0),
 }
-"""The paper's names of its measures: key in ``SampledMeasures`` and factor of the paper's unit."""
+"""Measures by their names in the paper: key in ``SampledMeasures``, factor to the unit of the paper."""
 
 
 def _paper(measures: dict[str, Any], name: str) -> str:
-    key, factor = PAPER[name]
+    key, factor = PAPER_MEASURES[name]
     value = measures[key]
     return "-" if value is None else f"{factor * value:.3f}"
 
 
 def _boundary(evaluation: Evaluation) -> str:
-    found = evaluation.boundary
-    if found is None:
+    distance = evaluation.boundary
+    if distance is None:
         return "none to compare"
-    mean, most = max(found.mean_ab, found.mean_ba), max(found.max_ab, found.max_ba)
-    return f"mean distance {mean:.3g}, largest {most:.3g}"
+    mean, largest = max(distance.mean_ab, distance.mean_ba), max(distance.max_ab, distance.max_ba)
+    return f"mean distance {mean:.3g}, largest {largest:.3g}"
 
 
 def _crossing(evaluation: Evaluation) -> str:

@@ -1,4 +1,4 @@
-"""``anisomesh figure``: pictures for papers and portfolios; the group of the three kinds of figures."""
+"""``anisomesh figure``: the group of the three kinds of figures."""
 
 from __future__ import annotations
 

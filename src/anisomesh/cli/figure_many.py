@@ -9,18 +9,17 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 from typer.core import TyperCommand
 
-from anisomesh.cli.arguments import (
-    FinalSharpness,
-    Metric,
-    MetricName,
-    Quiet,
-    Seed,
-    Sharpness,
-    Source,
-    Threads,
-    remesh_options,
+from anisomesh.cli.arguments import COMMON_REMESH_OPTIONS, Quiet, Source, takes_remesh_options
+from anisomesh.cli.figure_options import (
+    Direction,
+    Out,
+    Scale,
+    Up,
+    check_figure_path,
+    conclude,
+    picture_options,
+    size,
 )
-from anisomesh.cli.figure_options import Direction, Out, Scale, Up, camera, check_file, conclude, size
 from anisomesh.cli.job import read, run_remesh
 from anisomesh.cli.progress import progress
 from anisomesh.cli.report import counted
@@ -28,7 +27,7 @@ from anisomesh.cli.report import counted
 if TYPE_CHECKING:
     from anisomesh.mesh.surface import Surface
 
-RATIOS = "1 0.6 0.2 0.1"
+DEFAULT_STRIP_RATIOS = "1 0.6 0.2 0.1"  # some of the ratios in the paper's Table 1
 
 
 def gallery(
@@ -36,7 +35,7 @@ def gallery(
     out: Out,
     columns: Annotated[int | None, typer.Option(min=1, help="Meshes per row.")] = None,
     same_view: Annotated[
-        bool, typer.Option("--same-view", help="One camera for all, as for versions of one shape.")
+        bool, typer.Option("--same-view", help="Use one camera for all meshes, for versions of one shape.")
     ] = False,
     direction: Direction = None,
     up: Up = None,
@@ -47,8 +46,8 @@ def gallery(
     from anisomesh.viz import Panel
     from anisomesh.viz import gallery as draw
 
-    view = camera(direction, up)
-    check_file(out)
+    view = picture_options(direction, up, scale)
+    check_figure_path(out)
     with progress(quiet) as display:
         surfaces = [read(source)[0] for source in sources]
         panels = [
@@ -56,12 +55,12 @@ def gallery(
             for source, surface in zip(sources, surfaces, strict=True)
         ]
         display.note(f"drawing {out}")
-        draw(panels, out, columns=columns, same_view=same_view, scale=scale, **view)
+        draw(panels, out, columns=columns, same_view=same_view, options=view)
     conclude([(panel.name, size(panel.surface)) for panel in panels], out, quiet)
 
 
 class StripCommand(TyperCommand):
-    """A command whose ``--ratios`` takes all numbers that follow it."""
+    """A command with an option ``--ratios`` that takes all numbers after it."""
 
     def parse_args(self, ctx: Any, args: list[str]) -> list[str]:
         """Join the numbers after ``--ratios`` to one word, then parse as usual."""
@@ -76,30 +75,26 @@ class StripCommand(TyperCommand):
         return super().parse_args(ctx, words)
 
 
+@takes_remesh_options(*COMMON_REMESH_OPTIONS)
 def strip(
     source: Source,
     out: Out,
     ratios: Annotated[
         str, typer.Option("--ratios", metavar="R [R ...]", help="Vertices of each result per vertex of the input.")
-    ] = RATIOS,
-    metric: MetricName = Metric.curvature,
-    sharpness: Sharpness = 7.0,
-    final_sharpness: FinalSharpness = None,
-    seed: Seed = 0,
-    threads: Threads = 2,
+    ] = DEFAULT_STRIP_RATIOS,
     direction: Direction = None,
     up: Up = None,
     scale: Scale = 2,
     quiet: Quiet = False,
+    **options: Any,
 ) -> None:
     """Remesh IN at several numbers of vertices and draw the results in a row, seen from the same side."""
     from anisomesh.viz import Panel
     from anisomesh.viz import gallery as draw
 
     wanted = _parsed(ratios)
-    view = camera(direction, up)
-    check_file(out)
-    options = remesh_options(metric, sharpness, final_sharpness, seed, threads)
+    view = picture_options(direction, up, scale)
+    check_figure_path(out)
     panels, rows = [], []
     with progress(quiet) as display:
         surface, seconds = read(source)
@@ -110,7 +105,7 @@ def strip(
             rows.append((panels[-1].name, size(result.surface)))
             rows += [("warning", text) for text in facts["warnings"]]
         display.note(f"drawing {out}")
-        draw(panels, out, columns=len(panels), same_view=True, scale=scale, **view)
+        draw(panels, out, columns=len(panels), same_view=True, options=view)
     conclude(rows, out, quiet)
 
 

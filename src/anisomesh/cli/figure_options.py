@@ -1,72 +1,68 @@
-"""Arguments and output that all figures have: the file, its size in pixels, the camera, what is said at the end."""
+"""Arguments and output that all figures share: file, resolution, camera, summary."""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
-from enum import StrEnum
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import TYPE_CHECKING, Annotated, Literal, get_args
 
 import typer
 
-from anisomesh.cli.job import check_picture, check_place
+from anisomesh.cli.job import check_output_path, check_picture_path
 from anisomesh.cli.report import counted, table
 
 if TYPE_CHECKING:
     from anisomesh.mesh.surface import Surface
+    from anisomesh.viz import PictureOptions
 
-
-class Axis(StrEnum):
-    """A coordinate axis."""
-
-    x = "x"
-    y = "y"
-    z = "z"
-
+AxisName = Literal["x", "y", "z"]
 
 Out = Annotated[Path, typer.Option("--out", "-o", metavar="FILE", help="Figure to write: .png or .pdf.")]
 Scale = Annotated[int, typer.Option("--scale", min=1, max=4, help="Resolution: 1 for the screen, 2 to 4 for print.")]
 Direction = Annotated[
     tuple[float, float, float] | None,
-    typer.Option("--from", metavar="X Y Z", help="Look from this direction; else at the broad side, turned a little."),
+    typer.Option("--from", metavar="X Y Z", help="Direction to look from; by default obliquely at the broadest side."),
 ]
-Up = Annotated[Axis | None, typer.Option("--up", help="Axis that points up; else z, or y where z is looked along.")]
+Up = Annotated[AxisName | None, typer.Option("--up", help="Axis that points up; by default z, or y in a view along z.")]
 
 
-def check_file(out: Path) -> None:
-    """Find out before any work that a figure cannot be drawn here or written there."""
-    check_place(out)
-    check_picture(out, "-o")
-
-
-def camera(direction: tuple[float, float, float] | None, up: Axis | None) -> dict[str, Any]:
-    """Return the keyword arguments of the pictures for these options.
+def check_figure_path(out: Path) -> None:
+    """Check before any work that a figure can be drawn on this machine and written to a file.
 
     Raises
     ------
     typer.BadParameter
-        If there is no such view.
+        If the folder does not exist, the name is that of a folder, or the suffix is wrong.
+    AnisomeshError
+        If nothing can be drawn on this machine.
     """
-    number = None if up is None else list(Axis).index(up)
-    if direction is not None:
-        import numpy as np
+    check_output_path(out)
+    check_picture_path(out, "-o")
 
-        from anisomesh.errors import OptionError
-        from anisomesh.viz.camera import camera_axes
 
-        try:
-            camera_axes(np.zeros((1, 3)), direction, number)
-        except OptionError as error:
-            raise typer.BadParameter(f"--from: {error}") from None
-    return {"direction": direction, "up": number}
+def picture_options(direction: tuple[float, float, float] | None, up: AxisName | None, scale: int) -> PictureOptions:
+    """Return the camera and the resolution for the arguments of a figure.
+
+    Raises
+    ------
+    typer.BadParameter
+        If the direction is zero, not finite, or parallel to the axis that points up.
+    """
+    from anisomesh.errors import OptionError
+    from anisomesh.viz import PictureOptions
+
+    try:
+        return PictureOptions(direction=direction, up=None if up is None else get_args(AxisName).index(up), scale=scale)
+    except OptionError as error:
+        raise typer.BadParameter(f"--from: {error}") from None
 
 
 def size(surface: Surface) -> str:
-    """Return the size of a surface in words."""
+    """Return the numbers of vertices and triangles of a surface in words."""
     return f"{counted(surface.n_points, 'vertex', 'vertices')}, {counted(surface.n_faces, 'triangle')}"
 
 
 def conclude(rows: Sequence[tuple[str, str]], out: Path, quiet: bool) -> None:
-    """Say what was drawn and where it is, unless quiet."""
+    """Print what was drawn and the file it was written to, unless quiet."""
     if not quiet:
         typer.echo(table([*rows, ("wrote", str(out))]))

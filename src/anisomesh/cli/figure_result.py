@@ -2,84 +2,75 @@
 
 from __future__ import annotations
 
-from enum import StrEnum
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import TYPE_CHECKING, Annotated, Any, Literal
 
 import typer
 
-from anisomesh.cli.arguments import (
-    FinalSharpness,
-    Metric,
-    MetricName,
-    Quiet,
-    Ratio,
-    Seed,
-    Sharpness,
-    Threads,
-    Vertices,
-    remesh_options,
+from anisomesh.cli.arguments import COMMON_REMESH_OPTIONS, Quiet, Ratio, Vertices, takes_remesh_options
+from anisomesh.cli.figure_options import (
+    Direction,
+    Out,
+    Scale,
+    Up,
+    check_figure_path,
+    conclude,
+    picture_options,
+    size,
 )
-from anisomesh.cli.figure_options import Direction, Out, Scale, Up, camera, check_file, conclude, size
 from anisomesh.cli.job import read, run_remesh
 from anisomesh.cli.progress import Display, progress
 
 if TYPE_CHECKING:
     from anisomesh.mesh.surface import Surface
-    from anisomesh.viz import Cells, Colouring
+    from anisomesh.viz import CellPolygons, Colouring
 
 
-class Colour(StrEnum):
-    """What the colour of a triangle of the result says."""
-
-    none = "none"
-    stretch = "stretch"
-    quality = "quality"
-    distance = "distance"
+ColourName = Literal["none", "stretch", "quality", "distance"]
 
 
+@takes_remesh_options(*COMMON_REMESH_OPTIONS)
 def command(
-    source: Annotated[Path, typer.Argument(metavar="INPUT", help="Mesh before: OBJ, OFF, PLY, STL, GLB, VTU, ...")],
+    source: Annotated[Path, typer.Argument(metavar="INPUT", help="Input mesh: OBJ, OFF, PLY, STL, GLB, VTU, ...")],
     out: Out,
     remeshed: Annotated[
-        Path | None, typer.Argument(metavar="RESULT", help="Mesh after; if left out, INPUT is remeshed.")
+        Path | None, typer.Argument(metavar="RESULT", help="Remeshed mesh; if left out, INPUT is remeshed.")
     ] = None,
     colour: Annotated[
-        Colour,
-        typer.Option("--colour", "--color", help="Colour of the result: its stretch, quality in the metric, distance."),
-    ] = Colour.none,
-    cells: Annotated[bool, typer.Option("--cells", help="Draw the Voronoi cells as well (without RESULT).")] = False,
+        ColourName,
+        typer.Option(
+            "--colour",
+            "--color",
+            help="Colour the result by stretch of the triangles, quality in the metric, or distance from the input.",
+        ),
+    ] = "none",
+    cells: Annotated[bool, typer.Option("--cells", help="Draw the Voronoi cells too (not with RESULT).")] = False,
     n_vertices: Vertices = None,
     ratio: Ratio = None,
-    metric: MetricName = Metric.curvature,
-    sharpness: Sharpness = 7.0,
-    final_sharpness: FinalSharpness = None,
-    seed: Seed = 0,
-    threads: Threads = 2,
     direction: Direction = None,
     up: Up = None,
     scale: Scale = 2,
     quiet: Quiet = False,
+    **options: Any,
 ) -> None:
     """Draw a result beside its input, with a close-up of the most stretched triangles.
 
     Give RESULT, or -n or --ratio to remesh INPUT now.
     """
     _check_choice(remeshed, cells, n_vertices, ratio)
-    view = camera(direction, up)
-    check_file(out)
-    options = remesh_options(metric, sharpness, final_sharpness, seed, threads)
+    view = picture_options(direction, up, scale)
+    check_figure_path(out)
     with progress(quiet) as display:
         if remeshed is None:
-            count = {"n_vertices": n_vertices, "ratio": ratio}
-            before, after, polygons, warnings = _remesh_now(source, display, cells, **count, **options)
+            options |= {"n_vertices": n_vertices, "ratio": ratio}
+            before, after, polygons, warnings = _remesh_now(source, display, cells, **options)
         else:
             before, after, polygons, warnings = *_read_both(source, remeshed), None, []
         display.note(f"drawing {out}")
         colouring = _colouring(colour, after, before)
         from anisomesh.viz import side_by_side
 
-        side_by_side(before, after, out, values=colouring, cells=polygons, scale=scale, **view)
+        side_by_side(before, after, out, values=colouring, cells=polygons, options=view)
     rows = [("input", size(before)), ("result", size(after))]
     rows += [] if colouring is None else [("colour", colouring.name)]
     conclude([*rows, *(("warning", text) for text in warnings)], out, quiet)
@@ -97,8 +88,8 @@ def _check_choice(remeshed: Path | None, cells: bool, n_vertices: int | None, ra
 
 def _remesh_now(
     source: Path, display: Display, cells: bool, **options: Any
-) -> tuple[Surface, Surface, Cells | None, list[str]]:
-    """Remesh a file; return input and result, the cells if they are wanted, and the warnings."""
+) -> tuple[Surface, Surface, CellPolygons | None, list[str]]:
+    """Remesh a file; return the repaired input, the result, its Voronoi cells on request, and the warnings."""
     from anisomesh.viz import voronoi_cells
 
     surface, seconds = read(source)
@@ -107,18 +98,18 @@ def _remesh_now(
 
 
 def _read_both(source: Path, remeshed: Path) -> tuple[Surface, Surface]:
-    """Read input and result; the input repaired as before a remesh, so that it has a metric."""
+    """Read input and result, and repair the input as a remesh does, so that it has a metric."""
     from anisomesh.repair.prepare import prepare
 
     before, after = read(source)[0], read(remeshed)[0]
     return prepare(before).surface, after
 
 
-def _colouring(colour: Colour, surface: Surface, reference: Surface) -> Colouring | None:
+def _colouring(colour: ColourName, surface: Surface, reference: Surface) -> Colouring | None:
     from anisomesh.viz import distance_colouring, quality_colouring, stretch_colouring
 
-    if colour is Colour.stretch:
+    if colour == "stretch":
         return stretch_colouring(surface)
-    if colour is Colour.quality:
+    if colour == "quality":
         return quality_colouring(surface, reference)
-    return distance_colouring(surface, reference) if colour is Colour.distance else None
+    return distance_colouring(surface, reference) if colour == "distance" else None

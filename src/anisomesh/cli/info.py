@@ -1,4 +1,4 @@
-"""``anisomesh info``: what a mesh file contains and what preparing it would do."""
+"""``anisomesh info``: describe a mesh file and the repair before a remesh."""
 
 from __future__ import annotations
 
@@ -18,18 +18,18 @@ def command(
     source: Annotated[Path, typer.Argument(metavar="IN", help="Mesh file: OBJ, OFF, PLY, STL, GLB, VTU, ...")],
     json_: Annotated[bool, typer.Option("--json", help="Print the facts as JSON and nothing else.")] = False,
 ) -> None:
-    """Describe a mesh: size, topology, defects, and what would be repaired before remeshing."""
+    """Describe a mesh: size, topology, defects, and the repairs before a remesh."""
     facts = describe(read(source)[0]) | {"file": str(source)}
     typer.echo(as_json(facts) if json_ else _text(facts))
 
 
 def describe(surface: Surface) -> dict[str, Any]:
-    """Return the facts about a surface, JSON-able.
+    """Return the facts about a surface for JSON: lengths in model units, the area in their square.
 
     Notes
     -----
-    The genus is given where it is defined, on an oriented manifold: the sum over the components, with every
-    boundary loop closed by a disk.
+    The genus is the sum over the components, with every boundary loop closed by a disk. It is None unless the surface
+    is an oriented manifold.
     """
     from anisomesh.repair.prepare import prepare
 

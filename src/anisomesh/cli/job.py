@@ -1,4 +1,4 @@
-"""One remesh as the commands run it: read, remesh with progress, write every file in full or not at all."""
+"""One remesh as the commands run it: read, remesh with progress, write each file in full or not at all."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True, kw_only=True)
 class Outputs:
-    """The files that a remesh writes; None for those that were not asked for."""
+    """The files that a remesh writes; None for each file that was not requested."""
 
     mesh: Path
     report: Path | None = None
@@ -28,34 +28,35 @@ class Outputs:
 
     @property
     def paths(self) -> list[Path]:
-        """The files that were asked for, in the order of writing."""
+        """The requested files, in the order of writing."""
         return [path for path in (self.mesh, self.report, self.rvd, self.picture) if path is not None]
 
     def check(self) -> None:
-        """Find out before a long computation that a file cannot be written.
+        """Check before a long computation that every file can be written.
 
         Raises
         ------
         typer.BadParameter
-            If a folder does not exist, a name is that of a folder or given twice, or a suffix is wrong.
+            If a folder does not exist, a path is a folder or used twice, or a suffix is wrong.
         AnisomeshError
-            If a picture was asked for and cannot be made here.
+            If a picture was requested and nothing can be drawn on this machine.
         """
         for path in self.paths:
-            check_place(path)
+            check_output_path(path)
         if len({path.resolve() for path in self.paths}) < len(self.paths):
             raise typer.BadParameter("two outputs have the same file name; give each its own")
-        from anisomesh.io.meshes import FORMATS
+        from anisomesh.io.meshes import MESH_FORMATS
 
-        if self.mesh.suffix.lower() not in FORMATS:
-            raise typer.BadParameter(f"{self.mesh}: expected a file name ending in one of {', '.join(sorted(FORMATS))}")
+        if self.mesh.suffix.lower() not in MESH_FORMATS:
+            expected = ", ".join(sorted(MESH_FORMATS))
+            raise typer.BadParameter(f"{self.mesh}: expected a file name ending in one of {expected}")
         if self.rvd is not None and self.rvd.suffix.lower() not in (".vtu", ".obj"):
             raise typer.BadParameter(f"--rvd {self.rvd}: expected a file name ending in .vtu or .obj")
         if self.picture is not None:
-            check_picture(self.picture, "--picture")
+            check_picture_path(self.picture, "--picture")
 
     def write(self, result: RemeshResult, facts: dict[str, Any], display: Display) -> None:
-        """Write the files, each by way of a temporary file that is renamed when it is complete."""
+        """Write the files, each to a temporary file that is renamed when it is complete."""
         from anisomesh.io.meshes import save
 
         display.note(f"writing {', '.join(str(path) for path in self.paths)}")
@@ -72,13 +73,13 @@ class Outputs:
             side_by_side(result.prepared, result.surface, self.picture)
 
 
-def check_place(path: Path) -> None:
-    """Find out that a file cannot be where it is wanted.
+def check_output_path(path: Path) -> None:
+    """Check that a file can be written to a path.
 
     Raises
     ------
     typer.BadParameter
-        If its folder does not exist or its name is that of a folder.
+        If its folder does not exist or the path is a folder.
     """
     if path.is_dir():
         raise typer.BadParameter(f"{path} is a folder; give the name of a file in it")
@@ -86,8 +87,15 @@ def check_place(path: Path) -> None:
         raise typer.BadParameter(f"{path}: there is no folder {path.parent}; create it first")
 
 
-def check_picture(path: Path, option: str) -> None:
-    """Find out that a picture cannot be drawn here, or not into this file, named by this option.
+def check_picture_path(path: Path, option: str) -> None:
+    """Check that a picture can be drawn on this machine and has a supported suffix.
+
+    Parameters
+    ----------
+    path
+        The picture.
+    option
+        Name of the option that has this path, for the message.
 
     Raises
     ------
@@ -104,7 +112,7 @@ def check_picture(path: Path, option: str) -> None:
 
 
 def read(path: Path) -> tuple[Surface, float]:
-    """Read a mesh file; return it and the seconds it took."""
+    """Read a mesh file and return the mesh and the time in seconds."""
     from anisomesh.io.meshes import load
 
     start = time.perf_counter()
@@ -122,18 +130,18 @@ def run_remesh(
     surface
         The input, in model units.
     display
-        Where progress goes.
+        Shows the progress.
     name
         Name of the input, for the report.
     load_seconds
-        Time that reading the input took.
+        Time of reading the input, in seconds.
     **options
-        Passed to :func:`anisomesh.pipeline.remesh`.
+        Arguments of :func:`anisomesh.pipeline.remesh`.
 
     Returns
     -------
     result, report
-        The report has the keys of ``RemeshResult.report()`` and ``version``, ``input`` and ``options``.
+        The report is ``RemeshResult.report()`` with the keys ``version``, ``input`` and ``options`` added.
     """
     from importlib.metadata import version
 

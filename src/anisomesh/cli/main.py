@@ -14,7 +14,7 @@ import typer
 from anisomesh.cli import benchmark, dataset, demo, evaluate, figure, info, remesh, train
 from anisomesh.errors import AnisomeshError
 
-# The base class of all errors in the arguments; it is public only through this subclass.
+# The base class of all usage errors; typer exports only this subclass.
 _UsageError: type[Exception] = typer.BadParameter.__bases__[0]
 
 app = typer.Typer(
@@ -48,7 +48,7 @@ def _main(
         bool, typer.Option("--version", help="Print the version and exit.", callback=_print_version, is_eager=True)
     ] = False,
 ) -> None:
-    """Turn any triangle mesh into an anisotropic one with as many vertices as you ask for."""
+    """Remesh triangle meshes anisotropically, with as many vertices as you ask for."""
     if context.invoked_subcommand is None:
         typer.echo(context.get_help())
         raise typer.Exit(2)
@@ -65,12 +65,12 @@ def main(arguments: list[str]) -> int:
     Parameters
     ----------
     arguments
-        The words after the program's name.
+        The arguments after the program's name.
 
     Returns
     -------
     int
-        0 done, 1 an error that anisomesh reports in one line on stderr, 2 wrong usage, 130 interrupted.
+        0 done, 1 failed with one line on stderr, 2 wrong usage, 130 interrupted.
     """
     try:
         status = app(args=arguments, prog_name="anisomesh", standalone_mode=False) or 0

@@ -11,19 +11,19 @@ from typing import TYPE_CHECKING
 if TYPE_CHECKING:
     from anisomesh.options import StepInfo
 
-_LABELS = {
+_STAGE_LABELS = {
     "prepare": "preparing the mesh",
-    "metric": "estimating curvature",
+    "metric": "computing the metric",
     "embed": "embedding",
     "cvt": "moving the sites",
     "dual": "building the triangles",
-    "search": "looking for a number:",
+    "search": "searching the number of vertices",
 }
-_SECONDS_BETWEEN_LINES = 5.0
+_SECONDS_BETWEEN_LINES = 5.0  # heuristic
 
 
 class Display(AbstractContextManager["Display"]):
-    """Progress that says nothing; the base of those that do."""
+    """Progress display that shows nothing; the base class of the others."""
 
     def __call__(self, step: StepInfo) -> None:
         """Ignore the step."""
@@ -35,28 +35,28 @@ class Display(AbstractContextManager["Display"]):
         """Do nothing."""
 
 
-class _Lines(Display):
-    """One line when a stage starts and then one every few seconds."""
+class _LineDisplay(Display):
+    """A line at the start of each stage and every few seconds after it."""
 
     def __init__(self) -> None:
         self._stage = ""
         self._last = 0.0
 
     def __call__(self, step: StepInfo) -> None:
-        """Print the step if it starts a stage or if the last line is some time ago."""
+        """Print the step if it starts a stage or the last line is 5 s old."""
         now = time.monotonic()
         if step.stage == self._stage and now - self._last < _SECONDS_BETWEEN_LINES:
             return
         self._stage, self._last = step.stage, now
-        self.note(f"{_LABELS.get(step.stage, step.stage)}{_details(step)}")
+        self.note(f"{_STAGE_LABELS.get(step.stage, step.stage)}{_details(step)}")
 
     def note(self, text: str) -> None:
         """Print a remark."""
         print(text, file=sys.stderr, flush=True)
 
 
-class _Bar(Display):
-    """A live bar that disappears at the end."""
+class _BarDisplay(Display):
+    """Live progress bar that disappears at the end."""
 
     def __init__(self) -> None:
         from rich.console import Console
@@ -72,20 +72,20 @@ class _Bar(Display):
         )
         self._task = self._progress.add_task("starting", total=None, details="")
 
-    def __enter__(self) -> _Bar:
+    def __enter__(self) -> _BarDisplay:
         """Show the bar."""
         self._progress.start()
         return self
 
     def __exit__(self, kind: type[BaseException] | None, error: BaseException | None, at: TracebackType | None) -> None:
-        """Take the bar away."""
+        """Remove the bar."""
         self._progress.stop()
 
     def __call__(self, step: StepInfo) -> None:
-        """Move the bar."""
+        """Update the bar."""
         self._progress.update(
             self._task,
-            description=_LABELS.get(step.stage, step.stage),
+            description=_STAGE_LABELS.get(step.stage, step.stage),
             completed=step.iteration,
             total=step.total or None,
             details=_details(step).lstrip(),
@@ -106,12 +106,12 @@ def _details(step: StepInfo) -> str:
 
 
 def progress(quiet: bool) -> Display:
-    """Return the progress display that suits stderr: nothing, a live bar or plain lines.
+    """Return a progress display for stderr: a live bar on a terminal, plain lines elsewhere.
 
     Parameters
     ----------
     quiet
-        True for no progress at all.
+        Show no progress at all.
 
     Returns
     -------
@@ -120,11 +120,11 @@ def progress(quiet: bool) -> Display:
     """
     if quiet:
         return Display()
-    return _Bar() if sys.stderr.isatty() else _Lines()
+    return _BarDisplay() if sys.stderr.isatty() else _LineDisplay()
 
 
 def announce_compilation(display: Display, *works: str) -> None:
-    """Say so if numeric kernels of these works are about to be compiled, which happens once per installation."""
+    """Announce the compilation of numeric kernels unless the kernels of these kinds of work are cached."""
     from anisomesh._kernels.warmup import kernels_cached
 
     if not all(map(kernels_cached, works)):

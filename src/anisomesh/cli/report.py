@@ -1,4 +1,4 @@
-"""What the commands print and write about a result: the summary, the JSON report."""
+"""Text and JSON that the commands print and write."""
 
 from __future__ import annotations
 
@@ -10,16 +10,16 @@ from typing import TYPE_CHECKING, Any
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
-EMBEDDINGS = {
-    "direct": "direct (no network)",
-    "neural": "neural (a network gives the metric)",
-    "hybrid": "hybrid (a mean of the measured metric and that of a network)",
+_METRIC_SOURCES = {
+    "direct": "direct (metric of the measured curvature)",
+    "neural": "neural (metric predicted by a network)",
+    "hybrid": "hybrid (mean of the measured and the predicted metric)",
 }
-STAGES = ("load", "prepare", "metric", "embed", "cvt", "dual")
+_STAGE_ORDER = ("load", "prepare", "metric", "embed", "cvt", "dual")
 
 
 def as_json(report: dict[str, Any]) -> str:
-    """Return strict JSON: numbers that are not finite become null."""
+    """Return a report as strict JSON, with null in place of numbers that are not finite."""
     return json.dumps(_finite(report), indent=2, allow_nan=False)
 
 
@@ -34,7 +34,7 @@ def _finite(value: Any) -> Any:
 
 
 def write_json(report: dict[str, Any], path: Path) -> None:
-    """Write the report as JSON, in full or not at all."""
+    """Write a report as JSON, in full or not at all."""
     from anisomesh.io.atomic import atomic_path
 
     with atomic_path(path) as temporary:
@@ -42,12 +42,12 @@ def write_json(report: dict[str, Any], path: Path) -> None:
 
 
 def counted(count: int, singular: str, plural: str | None = None) -> str:
-    """Return a number with its noun, ``1 face`` or ``1,200 faces``."""
+    """Return a number with its noun, such as ``1 face`` or ``1,200 faces``."""
     return f"{count:,} {singular if count == 1 else plural or singular + 's'}"
 
 
 def table(rows: Sequence[tuple[str, str]]) -> str:
-    """Return two aligned columns, one row per line."""
+    """Return rows as text in two aligned columns."""
     width = max(len(name) for name, _ in rows)
     return "\n".join(f"  {name:<{width}}  {text}" for name, text in rows)
 
@@ -58,22 +58,22 @@ def summary(report: dict[str, Any], written: Sequence[Path], notes: Sequence[str
     Parameters
     ----------
     report
-        What :meth:`anisomesh.result.RemeshResult.report` returns.
+        The result of :meth:`anisomesh.result.RemeshResult.report`.
     written
         The files that were written, in order.
     notes
-        What preparing the input changed, one line each.
+        Changes that the repair made to the input, one line each.
     """
     seconds, stretch = report["seconds"], report["stretch"]
-    stages = ", ".join(f"{stage} {seconds[stage]:.2f}" for stage in STAGES if stage in seconds)
+    stages = ", ".join(f"{stage} {seconds[stage]:.2f}" for stage in _STAGE_ORDER if stage in seconds)
     energy = "" if report["energy"] is None else f", energy {report['energy']:.4g}"
     rows = [
         ("vertices", f"{report['vertices']:,} (asked for {report['vertices_asked']:,})"),
         ("faces", f"{report['faces']:,}"),
         ("surface", describe_validity(report["validity"])),
-        *([("distance", f"{report['distance']:.4g} from the input at most")] if report.get("distance") else []),
+        *([("distance", f"at most {report['distance']:.4g} from the input")] if report.get("distance") else []),
         ("stretch", f"mean {stretch['mean']:.2f}, largest {stretch['max']:.2f} (1 = equilateral)"),
-        ("embedding", EMBEDDINGS[report["embedding"]]),
+        ("embedding", _METRIC_SOURCES[report["embedding"]]),
         ("optimiser", f"{counted(report['iterations'], 'iteration')}{energy}: {report['status']}"),
         ("seconds", f"{seconds['total']:.2f} ({stages})"),
         *(("prepared", note) for note in notes),
@@ -84,7 +84,7 @@ def summary(report: dict[str, Any], written: Sequence[Path], notes: Sequence[str
 
 
 def describe_validity(validity: dict[str, Any]) -> str:
-    """Return the validity of a surface in words: closed or open, parts, topology, defects."""
+    """Return the validity of a surface in words: boundary, components, topology, defects."""
     edges, vertices = validity["nonmanifold_edges"], validity["nonmanifold_vertices"]
     euler_input = validity.get("euler_input", validity["euler"])
     parts = [

@@ -1,4 +1,4 @@
-"""``anisomesh train``: train the network on a data set, or go on with a run."""
+"""``anisomesh train``: train a network on a data set, or resume a run."""
 
 from __future__ import annotations
 
@@ -17,14 +17,14 @@ def command(
     config: Annotated[
         Path,
         typer.Argument(
-            metavar="CONFIG", help="Training run as a TOML file, or the name of one of the package: default, paper."
+            metavar="CONFIG", help="Training run: a TOML file, or default or paper for the runs of the package."
         ),
     ],
-    resume: Annotated[bool, typer.Option("--resume", help="Go on from the checkpoint of the run.")] = False,
+    resume: Annotated[bool, typer.Option("--resume", help="Continue from the checkpoint of the run.")] = False,
     threads: Annotated[int, typer.Option("--threads", min=1, help="Worker threads of torch.")] = 1,
     quiet: Annotated[bool, typer.Option("--quiet", "-q", help="No progress.")] = False,
 ) -> None:
-    """Train a network on a data set; SIGTERM and Ctrl-C save and end the run, --resume goes on with it."""
+    """Train a network on a data set. SIGTERM and Ctrl-C save a checkpoint and stop; --resume continues."""
     from anisomesh.learn import require_torch
 
     require_torch()
@@ -36,7 +36,7 @@ def command(
     from anisomesh.learn.training.train import train
 
     torch.set_num_threads(threads)
-    first = int(os.environ.get("RANK", "0")) == 0  # of those that torchrun starts, only one talks
+    first = int(os.environ.get("RANK", "0")) == 0  # torchrun starts several processes; only the first prints
     quiet = quiet or not first
     options = load_training(config)
     files = files_of(Path(options.data))

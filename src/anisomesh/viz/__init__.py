@@ -1,6 +1,7 @@
-"""Pictures without a display, as PNG or PDF: input and result with a close-up, galleries, strips."""
+"""Pictures as PNG or PDF, drawn without a display: input beside result with a close-up, galleries."""
 
-from anisomesh.viz.cells import Cells, voronoi_cells
+from anisomesh.viz.camera import PictureOptions
+from anisomesh.viz.cells import CellPolygons, voronoi_cells
 from anisomesh.viz.colouring import Colouring, distance_colouring, quality_colouring, stretch_colouring
 from anisomesh.viz.gallery import Panel, gallery
 from anisomesh.viz.page import FORMATS
@@ -10,9 +11,10 @@ from anisomesh.viz.view import triangle_stretch
 
 __all__ = [
     "FORMATS",
-    "Cells",
+    "CellPolygons",
     "Colouring",
     "Panel",
+    "PictureOptions",
     "distance_colouring",
     "gallery",
     "quality_colouring",

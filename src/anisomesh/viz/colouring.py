@@ -1,4 +1,4 @@
-"""What the colour of a triangle says: its stretch, its quality in the metric, its distance from the reference."""
+"""Colours of triangles by stretch, by quality in the metric, or by distance from the reference."""
 
 from __future__ import annotations
 
@@ -16,25 +16,25 @@ from anisomesh.mesh.geometry import unit_frame
 from anisomesh.mesh.surface import Surface
 from anisomesh.viz.view import triangle_stretch
 
-_QUANTILE = 0.99
+_UPPER_COLOUR_QUANTILE = 0.99  # of the values, for the last colour: a few outliers must not hide the rest; heuristic
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Colouring:
-    """A value per face and the colours for it.
+    """A value per face and the colour map for the values.
 
     Parameters
     ----------
     values
         One number per face (F,).
     name
-        What the values are; written at the colour bar.
+        Name of the values, with their unit; the label of the colour bar.
     colours
-        Name of a colour map of Matplotlib.
+        Name of a Matplotlib colour map.
     part
-        First and last place on the colour map to use, of 0 to 1; edges are hard to see on the darkest colours.
+        Part of the colour map to use, within 0 to 1; edges are hard to see on the darkest colours.
     low, high
-        Values of the first and the last colour; if None, the least value and the 99 % quantile.
+        Values of the first and the last colour; if None, the smallest value and the 99 % quantile.
     """
 
     values: FaceScalars
@@ -46,16 +46,18 @@ class Colouring:
 
     @property
     def limits(self) -> tuple[float, float]:
-        """Values of the first and the last colour, the second larger."""
+        """Values of the first and the last colour, in increasing order."""
         finite = self.values[np.isfinite(self.values)]
-        low, high = (float(finite.min()), float(np.quantile(finite, _QUANTILE))) if len(finite) else (0.0, 1.0)
+        low, high = (
+            (float(finite.min()), float(np.quantile(finite, _UPPER_COLOUR_QUANTILE))) if len(finite) else (0.0, 1.0)
+        )
         low = low if self.low is None else self.low
         high = high if self.high is None else self.high
         return low, max(high, low + 1e-3 * (abs(low) or 1.0))
 
     @property
     def beyond(self) -> tuple[bool, bool]:
-        """Whether there are values below the first colour and above the last."""
+        """Whether values lie below the first colour, and whether values lie above the last."""
         low, high = self.limits
         return bool((self.values < low).any()), bool((self.values > high).any())
 
@@ -66,7 +68,7 @@ class Colouring:
         return np.asarray(self.colour_map()(share, bytes=True))[:, :3]
 
     def colour_map(self) -> Any:
-        """Return the colours as a colour map of Matplotlib."""
+        """Return the colours as a Matplotlib colour map."""
         from matplotlib import colormaps
         from matplotlib.colors import ListedColormap
 
@@ -74,20 +76,20 @@ class Colouring:
 
 
 def stretch_colouring(surface: Surface) -> Colouring:
-    """Colour triangles by their stretch in space, see :func:`~anisomesh.viz.view.triangle_stretch`."""
+    """Colour triangles by their stretch, see :func:`~anisomesh.viz.view.triangle_stretch`."""
     values = triangle_stretch(surface)
     return Colouring(values=values, name=f"stretch of the triangles, mean {_mean(values):.2f}", low=1.0)
 
 
 def quality_colouring(surface: Surface, reference: Surface) -> Colouring:
-    """Colour triangles by their quality G in the paper's metric of the reference; 1 for an equilateral one there.
+    """Colour triangles by their quality G in the curvature metric of the reference, 1 if equilateral in the metric.
 
     Parameters
     ----------
     surface
         The triangles.
     reference
-        The surface that was remeshed, prepared; its metric counts at the closest point of each vertex.
+        The repaired input of the remesh; the metric of a vertex is the metric at its closest point.
     """
     frame = unit_frame(reference.points)
     base = reference.with_points(frame.to_unit(reference.points))
@@ -97,7 +99,7 @@ def quality_colouring(surface: Surface, reference: Surface) -> Colouring:
 
 
 def distance_colouring(surface: Surface, reference: Surface) -> Colouring:
-    """Colour triangles by the mean distance of their corners and barycentre from the reference."""
+    """Colour triangles by the mean distance of corners and barycentre from the reference, in % of its diagonal."""
     at_points = np.sqrt(squared_distances(surface.points, reference))
     at_centres = np.sqrt(squared_distances(surface.points[surface.faces].mean(axis=1), reference))
     mean = (at_points[surface.faces].sum(axis=1) + at_centres) / 4.0

@@ -1,4 +1,4 @@
-"""Drawing one panel: a surface with its edges, in grey or in colours, or Voronoi cells, as an array of pixels."""
+"""Drawing one panel as an array of pixels: a surface with its edges, in grey or in colours, or Voronoi cells."""
 
 from __future__ import annotations
 
@@ -9,22 +9,25 @@ import numpy.typing as npt
 
 from anisomesh.mesh.surface import Surface
 from anisomesh.viz.camera import View
-from anisomesh.viz.cells import Cells
+from anisomesh.viz.cells import POINT_MERGE_TOLERANCE, CellPolygons
 from anisomesh.viz.colouring import Colouring
 from anisomesh.viz.edges import edge_style
 
 GREY, INK = "#dfe2e7", "#14171c"
-_SHADING: dict[str, Any] = {"smooth_shading": True, "split_sharp_edges": True, "feature_angle": 30.0}
+_MAX_SMOOTH_ANGLE = 30.0  # degrees; edges that bend more are shaded as sharp
+_SHADING: dict[str, Any] = {"smooth_shading": True, "split_sharp_edges": True, "feature_angle": _MAX_SMOOTH_ANGLE}
 _GREY_MATERIAL: dict[str, Any] = {"ambient": 0.3, "diffuse": 0.7, "specular": 0.0}
 _COLOUR_MATERIAL: dict[str, Any] = {"ambient": 0.5, "diffuse": 0.5, "specular": 0.0}
-_LIGHTS = (((0.0, 0.0, 1.0), 0.68), ((-1.0, 1.4, 1.0), 0.5), ((1.5, -0.3, 0.6), 0.25))
-_LIFT = 4e-3
+_LIGHTS = (((0.0, 0.0, 1.0), 0.68), ((-1.0, 1.4, 1.0), 0.5), ((1.5, -0.3, 0.6), 0.25))  # position, intensity
+_CELL_OUTLINE_LIFT = 4e-3  # half heights of the picture, towards the viewer; heuristic
+_CELL_OUTLINE_WIDTH = 1.2  # pixels of a picture of normal size
+_N_CELL_COLOURS = 64  # enough that few neighbours have the same colour; heuristic
 
 Pixels = npt.NDArray[np.uint8]
 
 
 def render(
-    shown: Surface | Cells,
+    shown: Surface | CellPolygons,
     view: View,
     size: tuple[int, int],
     *,
@@ -36,19 +39,19 @@ def render(
     Parameters
     ----------
     shown
-        What to draw.
+        The surface or the cells to draw.
     view
-        From where.
+        The projection.
     size
         Width and height in pixels.
     colouring
         Colours of the faces of a surface; light grey if None.
     scale
-        Pixels per pixel of a picture of normal size; lines get so much wider.
+        Pixels per pixel of a picture of normal size; lines are wider by this factor.
     """
     plotter = _plotter(size)
     try:
-        if isinstance(shown, Cells):
+        if isinstance(shown, CellPolygons):
             _draw_cells(plotter, shown, view, scale)
         else:
             _draw_surface(plotter, shown, colouring, edges=_edges(shown, view, size, scale))
@@ -72,7 +75,7 @@ def _plotter(size: tuple[int, int]) -> Any:
 
 
 def _look(plotter: Any, view: View, reach: float) -> None:
-    """Point the camera, from a distance beyond everything."""
+    """Place the camera outside the model, which reaches this far from the centre of the view."""
     camera = plotter.camera
     camera.focal_point = view.centre
     camera.position = view.centre + 1.1 * (reach or 1.0) * view.axes[2]
@@ -83,7 +86,7 @@ def _look(plotter: Any, view: View, reach: float) -> None:
 
 
 def _draw_surface(plotter: Any, surface: Surface, colouring: Colouring | None, edges: dict[str, Any]) -> None:
-    """Draw a surface, smooth but for its creases."""
+    """Draw a surface with smooth shading except at creases."""
     import pyvista
 
     mesh = pyvista.PolyData.from_regular_faces(surface.points, surface.faces)
@@ -101,24 +104,24 @@ def _edges(surface: Surface, view: View, size: tuple[int, int], scale: float) ->
     return {"show_edges": True, "edge_color": INK, "line_width": style.width, "edge_opacity": style.opacity}
 
 
-def _draw_cells(plotter: Any, cells: Cells, view: View, scale: float) -> None:
+def _draw_cells(plotter: Any, cells: CellPolygons, view: View, scale: float) -> None:
     """Draw polygons in pale colours, one per cell, and lines between the cells.
 
-    The lines are moved a little towards the viewer, which a parallel projection does not show, so that they lie on
-    the polygons.
+    The lines are moved slightly towards the viewer, which a parallel projection does not show, so that the polygons do
+    not hide them.
     """
     import pyvista
 
     mesh = pyvista.PolyData()
     mesh.points = cells.points
     mesh.SetPolys(pyvista.CellArray.from_arrays(cells.offsets, cells.corners))
-    palette = np.random.default_rng(0).permutation(64) / 64
-    mesh.cell_data["cell"] = palette[np.asarray(cells.labels) % 64]
-    mesh = mesh.clean(tolerance=1e-7)
+    palette = np.random.default_rng(0).permutation(_N_CELL_COLOURS) / _N_CELL_COLOURS
+    mesh.cell_data["cell"] = palette[np.asarray(cells.labels) % _N_CELL_COLOURS]
+    mesh = mesh.clean(tolerance=POINT_MERGE_TOLERANCE)
     plotter.add_mesh(mesh, scalars="cell", cmap="Pastel1", show_scalar_bar=False, **_SHADING, **_COLOUR_MATERIAL)
     sides = cells.outlines()
     if len(sides):
         lines = pyvista.PolyData()
-        lines.points = cells.points + _LIFT * view.half_height * view.axes[2]
+        lines.points = cells.points + _CELL_OUTLINE_LIFT * view.half_height * view.axes[2]
         lines.SetLines(pyvista.CellArray.from_regular_cells(sides.astype(int)))
-        plotter.add_mesh(lines, color=INK, line_width=1.2 * scale, opacity=0.7, lighting=False)
+        plotter.add_mesh(lines, color=INK, line_width=_CELL_OUTLINE_WIDTH * scale, opacity=0.7, lighting=False)

@@ -1,4 +1,4 @@
-"""Many surfaces in a grid, with captions; with the same camera, a strip of one shape at several resolutions."""
+"""Surfaces in a grid with captions; with one camera for all, a strip of one shape at several resolutions."""
 
 from __future__ import annotations
 
@@ -10,22 +10,23 @@ import numpy as np
 
 from anisomesh.errors import OptionError
 from anisomesh.mesh.surface import Surface
-from anisomesh.viz.camera import camera_axes, framed, height_for
+from anisomesh.viz.camera import PictureOptions, framed, height_for
 from anisomesh.viz.draw import render
 from anisomesh.viz.page import PALE, Page, check_format
 from anisomesh.viz.renderer import require_renderer
 
-_COLUMN = 480
-_GAP = 8
-_WIDTH = _COLUMN - 2 * _GAP
-_HEIGHTS = (240, 520)
-_LINES = 64
-_FULL_ROW = 4
+# Pixels of a picture of normal size.
+_GALLERY_COLUMN_WIDTH = 480
+_GALLERY_GAP = 8
+_GALLERY_PANEL_WIDTH = _GALLERY_COLUMN_WIDTH - 2 * _GALLERY_GAP
+_GALLERY_PANEL_HEIGHTS = (240, 520)  # smallest and largest
+_CAPTION_HEIGHT = 64
+_MAX_SINGLE_ROW = 4  # panels in one row by default
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Panel:
-    """One surface of a gallery, its name, and what is written below that."""
+    """A surface of a gallery, its name, and a note below the name."""
 
     surface: Surface
     name: str
@@ -38,65 +39,69 @@ def gallery(
     *,
     columns: int | None = None,
     same_view: bool = False,
-    direction: Sequence[float] | None = None,
-    up: int | None = None,
-    scale: int = 1,
+    options: PictureOptions | None = None,
 ) -> None:
     """Draw surfaces in a grid, row by row, into a PNG or PDF file.
 
     Parameters
     ----------
     panels
-        What to draw, at least one.
+        The surfaces, at least one.
     path
         The file to write, in full or not at all; the suffix is the format.
     columns
-        Surfaces per row; if None, all of up to four, else three or four.
+        Surfaces per row; if None, up to four in one row, more in rows of three or four.
     same_view
-        The same camera for all, as for one shape; otherwise each fills its panel.
-    direction, up
-        Where the viewer is, see :func:`~anisomesh.viz.camera.camera_axes`.
-    scale
-        Pixels per pixel of a picture of normal size (480 per column): more for print.
+        Use one camera for all surfaces, for versions of one shape; otherwise each surface fills its panel.
+    options
+        Camera and resolution; at scale 1 a column is 480 pixels wide.
 
     Raises
     ------
     AnisomeshError
         If pyvista is missing or nothing can be drawn on this machine.
     OptionError
-        If there is nothing to draw, the suffix is another one, or there is no such view.
+        If there is no panel or the suffix is not supported.
+    MeshFileError
+        If the file cannot be written.
     """
     require_renderer()
     check_format(path)
     if not panels:
         raise OptionError("there is no surface to draw; expected at least one")
+    options = options or PictureOptions()
+    scale = options.scale
     rows = _rows(len(panels), columns)
     every = [panel.surface.points[np.unique(panel.surface.faces)] for panel in panels]
     seen = [np.vstack(every)] * len(panels) if same_view else every
-    axes = [camera_axes(points, direction, up) for points in seen]
-    heights = [max(height_for(seen[k], axes[k], _WIDTH, _HEIGHTS) for k in row) for row in rows]
-    page = Page(_COLUMN * len(rows[0]), sum(heights) + len(rows) * (_GAP + _LINES), scale)
+    axes = [options.axes(points) for points in seen]
+    heights = [
+        max(height_for(seen[k], axes[k], _GALLERY_PANEL_WIDTH, _GALLERY_PANEL_HEIGHTS) for k in row) for row in rows
+    ]
+    page = Page(
+        _GALLERY_COLUMN_WIDTH * len(rows[0]), sum(heights) + len(rows) * (_GALLERY_GAP + _CAPTION_HEIGHT), scale
+    )
     top = 0
     for row, height in zip(rows, heights, strict=True):
-        top += _GAP
+        top += _GALLERY_GAP
         for column, k in enumerate(row):
-            left = _COLUMN * column + _GAP
-            view = framed(seen[k], axes[k], _WIDTH / height)
-            pixels = render(panels[k].surface, view, (_WIDTH * scale, height * scale), scale=scale)
-            page.picture(pixels, (left, top, _WIDTH, height))
+            left = _GALLERY_COLUMN_WIDTH * column + _GALLERY_GAP
+            view = framed(seen[k], axes[k], _GALLERY_PANEL_WIDTH / height)
+            pixels = render(panels[k].surface, view, (_GALLERY_PANEL_WIDTH * scale, height * scale), scale=scale)
+            page.picture(pixels, (left, top, _GALLERY_PANEL_WIDTH, height))
             _caption(page, panels[k], left, top + height)
-        top += height + _LINES
+        top += height + _CAPTION_HEIGHT
     page.save(path)
 
 
 def _rows(count: int, columns: int | None) -> list[range]:
-    """Return the numbers of the panels in each row; without a number of columns, with few empty places."""
+    """Return the indices of the panels in each row; by default with few empty places in the last row."""
     if columns is None:
-        columns = count if count <= _FULL_ROW else min((4, 3), key=lambda wide: -count % wide)
+        columns = count if count <= _MAX_SINGLE_ROW else min((4, 3), key=lambda wide: -count % wide)
     return [range(first, min(first + columns, count)) for first in range(0, count, columns)]
 
 
 def _caption(page: Page, panel: Panel, left: float, top: float) -> None:
-    middle = left + 0.5 * _WIDTH
-    page.text(panel.name, middle, top + 4, size=12.0, room=_WIDTH)
-    page.text(panel.note, middle, top + 29, size=10.0, room=_WIDTH, colour=PALE)
+    middle = left + 0.5 * _GALLERY_PANEL_WIDTH
+    page.text(panel.name, middle, top + 4, size=12.0, room=_GALLERY_PANEL_WIDTH)
+    page.text(panel.note, middle, top + 29, size=10.0, room=_GALLERY_PANEL_WIDTH, colour=PALE)

@@ -1,4 +1,4 @@
-"""The sheet that panels are put on, with captions, frames and colour bars, written as PNG or PDF."""
+"""A page of panels with captions, frames and colour bars, written as PNG or PDF."""
 
 from __future__ import annotations
 
@@ -13,32 +13,33 @@ from anisomesh.viz.draw import INK, Pixels
 
 FORMATS = (".png", ".pdf")
 ACCENT, PALE = "#c8321e", "#5b626e"
-_PER_INCH = 128  # so that sizes in inches are exact and panels keep their pixels
+_PIXELS_PER_INCH = 128  # a power of two, so that sizes in inches are exact and panels keep their pixels
+_MIN_TEXT_LENGTH = 8  # characters that a shortened line keeps; heuristic
 
 Box = tuple[float, float, float, float]
 
 
 def check_format(path: str | Path) -> None:
-    """Refuse a file name whose suffix is not one of :data:`FORMATS`.
+    """Check that the suffix of a file name is one of :data:`FORMATS`.
 
     Raises
     ------
     OptionError
-        If it is another one.
+        If the suffix is not supported.
     """
     if Path(path).suffix.lower() not in FORMATS:
         raise OptionError(f"{path}: expected a file name ending in {' or '.join(FORMATS)}")
 
 
 class Page:
-    """A white sheet; places are in pixels of normal size from its upper left corner.
+    """A white page; positions are in pixels of normal size from its upper left corner.
 
     Parameters
     ----------
     width, height
         Size in pixels of normal size.
     scale
-        How many pixels to draw for each, along both sides.
+        Pixels per pixel of normal size, along both sides.
     """
 
     def __init__(self, width: int, height: int, scale: int = 1) -> None:
@@ -46,18 +47,18 @@ class Page:
         from matplotlib.figure import Figure
 
         self.width, self.height, self.scale = width, height, scale
-        size = (width / _PER_INCH, height / _PER_INCH)
-        self._figure: Any = Figure(figsize=size, dpi=_PER_INCH * scale, facecolor="white")
+        size = (width / _PIXELS_PER_INCH, height / _PIXELS_PER_INCH)
+        self._figure: Any = Figure(figsize=size, dpi=_PIXELS_PER_INCH * scale, facecolor="white")
         FigureCanvasAgg(self._figure)
 
     def picture(self, pixels: Pixels, box: Box) -> None:
-        """Put a panel into a box: left, top, width, height."""
+        """Draw a panel in a box: left, top, width, height."""
         axes = self._axes(box)
         axes.set_axis_off()
         axes.imshow(pixels, interpolation="none", aspect="auto")
 
     def frame(self, box: Box) -> None:
-        """Draw a frame along the rim of a box."""
+        """Draw a frame around a box."""
         from matplotlib.patches import Rectangle
 
         left, top, width, height = box
@@ -68,19 +69,19 @@ class Page:
         self._figure.add_artist(patch)
 
     def text(self, text: str, middle: float, top: float, *, size: float, room: float, colour: str = INK) -> None:
-        """Write one line centred under a place, shortened in its middle where it is wider than its room."""
+        """Write one line centred below a position, shortened in the middle if it is wider than ``room``."""
         place = (middle / self.width, 1.0 - top / self.height)
         style = {"fontsize": size, "color": colour, "ha": "center", "va": "top", "parse_math": False}
         item = self._figure.text(*place, text, **style)
         kept = len(text)
         with warnings.catch_warnings():
-            warnings.simplefilter("ignore")  # a sign that the font does not have is drawn as a box
-            while kept > 8 and item.get_window_extent().width > room * self.scale:
+            warnings.simplefilter("ignore")  # a character that the font lacks is drawn as a box
+            while kept > _MIN_TEXT_LENGTH and item.get_window_extent().width > room * self.scale:
                 kept -= 1
                 item.set_text(f"{text[: (kept + 1) // 2]}…{text[len(text) - kept // 2 :]}")
 
     def colour_bar(self, colouring: Colouring, box: Box) -> None:
-        """Draw a horizontal colour bar in a box, numbers and name below it."""
+        """Draw a horizontal colour bar in a box, with numbers and the name of the values below it."""
         from matplotlib.cm import ScalarMappable
         from matplotlib.colors import Normalize
 
@@ -112,7 +113,7 @@ class Page:
         undated: dict[str, None] = {"Software": None} if kind == "png" else {"CreationDate": None}
         with atomic_path(path) as temporary, matplotlib.rc_context({"pdf.fonttype": 42}), warnings.catch_warnings():
             warnings.simplefilter("ignore")
-            self._figure.savefig(temporary, format=kind, dpi=_PER_INCH * self.scale, metadata=undated)
+            self._figure.savefig(temporary, format=kind, dpi=_PIXELS_PER_INCH * self.scale, metadata=undated)
 
     def _axes(self, box: Box) -> Any:
         left, top, width, height = box

@@ -1,4 +1,4 @@
-"""Whether anything can be drawn on this machine."""
+"""Check that pictures can be drawn on this machine."""
 
 from __future__ import annotations
 
@@ -29,8 +29,8 @@ def require_renderer() -> None:
 
     Notes
     -----
-    VTK ends the process when no OpenGL library works, so the check draws an empty window in another process;
-    this takes about half a second, once per process.
+    VTK ends the process if no OpenGL library works, so the check draws an empty window in another process. It takes
+    about half a second, once per process.
     """
     for name in ("pyvista", "matplotlib"):
         if importlib.util.find_spec(name) is None:

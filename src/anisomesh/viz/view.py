@@ -1,4 +1,4 @@
-"""Where to look: a view of everything and a close-up of the most stretched triangles."""
+"""Views of a whole surface and close-ups of its most stretched triangles."""
 
 from __future__ import annotations
 
@@ -9,18 +9,23 @@ from anisomesh._arrays import FaceScalars, Points, Vector3
 from anisomesh.mesh.surface import Surface
 from anisomesh.viz.camera import View, camera_axes, framed
 
-_FACES_IN_CLOSEUP = 150
-_CANDIDATES = 400
+_FACES_IN_CLOSEUP = 150  # heuristic
+_CLOSEUP_HALF_HEIGHTS = (0.04, 0.2)  # of the half height of the whole view; heuristic
+_MAX_CLOSEUP_CANDIDATES = 400  # faces that are compared; bounds the time
+_MIN_FACING_COSINE = 0.6  # between normal and viewing direction of a face that may be the centre; heuristic
+_NEIGHBOURHOOD_RADIUS = 1.5  # half heights of the close-up, around a candidate; heuristic
+_MAX_SCORED_STRETCH = 30.0  # a larger stretch counts as this one, so that degenerate triangles do not win; heuristic
+_OCCLUSION_TOLERANCE = 1e-6  # bounding-box diagonals; rounding of the depth of the face itself
 
 
 def triangle_stretch(surface: Surface) -> FaceScalars:
-    """Return how far each triangle is stretched (F,): 1 for an equilateral one, infinite without area.
+    """Return the stretch of each triangle (F,): 1 for an equilateral one, infinite for one without area.
 
     Notes
     -----
-    The ratio of the singular values of the linear map from an equilateral triangle. With the side lengths
-    a, b, c and the area A, ``q = (a^2 + b^2 + c^2) / (4 sqrt(3) A)`` is half the sum of the ratio and its
-    inverse, hence the ratio is ``q + sqrt(q^2 - 1)``.
+    The stretch is the ratio of the singular values of the linear map from an equilateral triangle. With side lengths
+    a, b, c and area A, ``q = (a^2 + b^2 + c^2) / (4 sqrt(3) A)`` is half the sum of the ratio and its inverse, so the
+    ratio is ``q + sqrt(q^2 - 1)``.
     """
     squares = (surface.edge_lengths[surface.face_edges] ** 2).sum(axis=1)
     half_sum = np.full(surface.n_faces, np.inf)
@@ -30,12 +35,12 @@ def triangle_stretch(surface: Surface) -> FaceScalars:
 
 
 def whole_view(points: Points, aspect: float) -> View:
-    """Look along the shortest side of the bounding box, turned a little, with every point in view.
+    """Return a view oblique to the shortest side of the bounding box that shows every point.
 
     Parameters
     ----------
     points
-        What has to be in view (V, 3).
+        The points to show (V, 3).
     aspect
         Width of the picture divided by its height.
     """
@@ -43,22 +48,31 @@ def whole_view(points: Points, aspect: float) -> View:
 
 
 def closeup(surface: Surface, view: View, aspect: float) -> View:
-    """Look at the place where the visible triangles are most stretched, about 150 of them in view.
+    """Return a close-up of the visible place with the most stretched triangles, with about 150 triangles in view.
+
+    Parameters
+    ----------
+    surface
+        The surface.
+    view
+        View of the whole surface; the close-up has its axes.
+    aspect
+        Width of the picture divided by its height.
 
     Notes
     -----
-    Compares the mean logarithm of the stretch around a few hundred faces that are seen from the front, lowered
-    where the surface does not fill the neighbourhood, and takes the best that nothing hides.
+    The score of a place is the mean logarithm of the stretch around a front-facing face, times the share of the
+    neighbourhood that the surface covers. The best place that no other face hides is taken.
     """
     towards = view.axes[2]
     centroids = surface.points[surface.faces].mean(axis=1)
     facing = np.maximum(surface.face_normals @ towards, 0.0)
-    stretch = np.log(np.clip(triangle_stretch(surface), 1.0, 30.0))
-    front = np.flatnonzero(facing > 0.6)
+    stretch = np.log(np.clip(triangle_stretch(surface), 1.0, _MAX_SCORED_STRETCH))
+    front = np.flatnonzero(facing > _MIN_FACING_COSINE)
     if len(front) == 0:
         front = np.arange(surface.n_faces)
-    candidates = front[:: max(1, len(front) // _CANDIDATES)]
-    radius = 1.5 * _half_height(surface.area / surface.n_faces, view, aspect)
+    candidates = front[:: max(1, len(front) // _MAX_CLOSEUP_CANDIDATES)]
+    radius = _NEIGHBOURHOOD_RADIUS * _half_height(surface.area / surface.n_faces, view, aspect)
     around = cKDTree(centroids).query_ball_point(centroids[candidates], radius)
     covered = [(surface.face_areas[faces] * facing[faces]).sum() / (np.pi * radius**2) for faces in around]
     score = np.array([stretch[faces].mean() for faces in around]) * np.minimum(covered, 1.0)
@@ -69,17 +83,17 @@ def closeup(surface: Surface, view: View, aspect: float) -> View:
 
 
 def _half_height(face_area: float, view: View, aspect: float) -> float:
-    """Return the half height of a close-up that shows the wanted number of faces of this area."""
-    half_height = 0.5 * np.sqrt(_FACES_IN_CLOSEUP * face_area / aspect)
-    return float(np.clip(half_height, 0.04 * view.half_height, 0.2 * view.half_height))
+    """Return the half height of a close-up that shows about 150 faces of this mean area, within limits."""
+    low, high = (share * view.half_height for share in _CLOSEUP_HALF_HEIGHTS)
+    return float(np.clip(0.5 * np.sqrt(_FACES_IN_CLOSEUP * face_area / aspect), low, high))
 
 
 def _visible(surface: Surface, point: Vector3, towards: Vector3) -> bool:
-    """Tell whether no face lies between a point of the surface and the viewer."""
+    """Return whether no face lies between a point of the surface and the viewer."""
     a, b, c = (surface.points[surface.faces[:, corner]] - point for corner in range(3))
     weights = np.stack([np.cross(b, c) @ towards, np.cross(c, a) @ towards, np.cross(a, b) @ towards])
     total = weights.sum(axis=0)
     hit = ((weights >= 0).all(axis=0) | (weights <= 0).all(axis=0)) & (total != 0)
     depths = np.stack([a @ towards, b @ towards, c @ towards])
     depth = (weights[:, hit] * depths[:, hit]).sum(axis=0) / total[hit]
-    return not bool((depth > 1e-6 * surface.diagonal).any())
+    return not bool((depth > _OCCLUSION_TOLERANCE * surface.diagonal).any())
