@@ -76,7 +76,7 @@ def test_pieces_of_a_split_edge_are_those_that_lie_in_it(length):
         ([[-1, 0]], "0 to 24"),
         ([[0.5, 1.0]], "whole numbers"),
         ([[0, 1], [0, 24]], "1 of the 2 pairs"),
-        ([[3, 3]], "no edges"),
+        ([[3, 3]], "not edges"),
     ],
 )
 def test_pairs_that_are_no_edges_are_refused(pairs, words):
