@@ -15,7 +15,7 @@ _MIN_CORNER_TURN = 45.0  # degrees between the two sharp edges at a corner; heur
 def sharp_edges(surface: Surface, angle: float) -> EdgeMask:
     """Return which edges (E,) have two faces whose normals enclose more than an angle in degrees.
 
-    Boundary edges are not sharp, whatever the angle; at non-manifold edges the first two faces count.
+    Boundary and non-manifold edges are not sharp.
     """
     first, second = surface.edge_faces.T
     cosine = np.einsum("ex,ex->e", surface.face_normals[first], surface.face_normals[second])
