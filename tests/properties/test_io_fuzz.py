@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from anisomesh.errors import MeshFileError
-from anisomesh.io.meshes import FORMATS, load, save
+from anisomesh.io.meshes import MESH_FORMATS, load, save
 from anisomesh.mesh.surface import Surface
 
 CASES = 2_300  # of each kind of file
@@ -35,7 +35,7 @@ end_header
 ASCII_STL = "solid a\n" + 2 * (
     "facet normal 0 0 1\nouter loop\nvertex 0 0 0\nvertex 1 0 0\nvertex 0 1 0.5\nendloop\nendfacet\n"
 )
-KINDS = {**dict.fromkeys(FORMATS), "ascii.ply": ASCII_PLY, "ascii.stl": ASCII_STL + "endsolid a\n"}
+KINDS = {**dict.fromkeys(MESH_FORMATS), "ascii.ply": ASCII_PLY, "ascii.stl": ASCII_STL + "endsolid a\n"}
 HOSTILE = [b"999999999", b"-1", b"4294967295", b"1e308", b"nan", b"99999999999999999999", b"", b"0"]
 
 

@@ -9,7 +9,7 @@ from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
 from anisomesh.errors import MeshFileError
-from anisomesh.io.meshes import FORMATS, load, save
+from anisomesh.io.meshes import MESH_FORMATS, load, save
 from anisomesh.mesh.surface import Surface
 from anisomesh.shapes import analytic as shapes
 from conftest import examples
@@ -56,7 +56,7 @@ def mutations(rng, data):
         yield bytes(changed)
 
 
-@pytest.mark.parametrize("suffix", FORMATS)
+@pytest.mark.parametrize("suffix", MESH_FORMATS)
 @pytest.mark.parametrize("seed", range(3))
 def test_damaged_files_give_one_clear_error_or_a_mesh(tmp_path, capfd, suffix, seed):
     rng = np.random.default_rng(seed)
@@ -77,7 +77,7 @@ def test_damaged_files_give_one_clear_error_or_a_mesh(tmp_path, capfd, suffix, s
     assert capfd.readouterr() == ("", "")
 
 
-@pytest.mark.parametrize("suffix", FORMATS)
+@pytest.mark.parametrize("suffix", MESH_FORMATS)
 def test_truncation_is_noticed(tmp_path, suffix):
     """Whatever is cut off, the file is refused, unless all numbers are still there (a text's last line ends)."""
     path = tmp_path / f"mesh{suffix}"

@@ -13,7 +13,7 @@ import pytest
 from anisomesh.errors import MeshFileError
 from anisomesh.io.atomic import atomic_path
 from anisomesh.io.gmsh_counts import check_counts
-from anisomesh.io.meshes import FORMATS, load, save
+from anisomesh.io.meshes import MESH_FORMATS, load, save
 from anisomesh.mesh.surface import Surface
 from anisomesh.shapes import analytic as shapes
 
@@ -68,7 +68,7 @@ BAD = [
         "trunc",
     ),
     ("a.ply", "solid\n", "line ply"),
-    ("a.stl", b"\0" * 80 + struct.pack("<I", 2) + b"\0" * 50, "promises 2 triangles, that is 184 bytes, but has 134"),
+    ("a.stl", b"\0" * 80 + struct.pack("<I", 2) + b"\0" * 50, "declares 2 triangles, that is 184 bytes, but has 134"),
     ("a.stl", b"\0" * 80 + struct.pack("<I", 0), "no face"),
     ("a.stl", b"\0" * 40, "truncated"),
     ("a.stl", "solid a\nfacet normal 0 0 1\nouter loop\nvertex 0 0 0\nvertex 1 0 0\n", "truncated"),
@@ -77,11 +77,11 @@ BAD = [
         "solid a\nfacet normal 0 0 1\nouter loop\nvertex 0 0 0\nvertex 1 0 0\nendloop endfacet endsolid",
         "trunc",
     ),
-    ("a.glb", b"glTF" + struct.pack("<II", 2, 400) + b"\0" * 100, "promises 400 bytes but has 112"),
+    ("a.glb", b"glTF" + struct.pack("<II", 2, 400) + b"\0" * 100, "declares 400 bytes but has 112"),
     ("a.glb", b"nonsense", "glTF"),
     ("a.vtu", "<VTKFile type='UnstructuredGrid'>", "VTU"),
     ("a.msh", "$MeshFormat\n2.2 0 8\n$EndMeshFormat\n", "EndNodes"),
-    ("a.mesh", "MeshVersionFormatted 2\nDimension 3\nVertices\n4\n0 0 0 0\n", "Vertices promises 4 rows"),
+    ("a.mesh", "MeshVersionFormatted 2\nDimension 3\nVertices\n4\n0 0 0 0\n", "Vertices declares 4 rows"),
     (
         "a.mesh",
         "MeshVersionFormatted 2\nDimension 3\nVertices\n3\n0 0 0 0 1 0 0 0 0 1 0 0\nTriangles\n1\n1 2 4 0",
@@ -89,7 +89,7 @@ BAD = [
     ),
     ("a.mesh", "MeshVersionFormatted 2\nDimension 4\n", "dimension is 4"),
     ("a.mesh", "Vertices 3", "MeshVersionFormatted"),
-    ("a.xyz", THREE, r"unknown format \.xyz; known are \.glb, .*\.vtu"),
+    ("a.xyz", THREE, r"unknown format \.xyz; expected one of \.glb, .*\.vtu"),
     ("mesh", THREE, "no extension"),
 ]
 
@@ -104,7 +104,7 @@ def test_bad_file_gives_one_line_that_names_it(tmp_path, capfd, name, content, m
     assert capfd.readouterr() == ("", "")
 
 
-@pytest.mark.parametrize("suffix", FORMATS)
+@pytest.mark.parametrize("suffix", MESH_FORMATS)
 def test_missing_file_and_folder(tmp_path, suffix):
     with pytest.raises(MeshFileError, match="no such file"):
         load(tmp_path / f"none{suffix}")
@@ -219,19 +219,19 @@ def test_point_data_reaches_vtu_and_ply(tmp_path, caplog):
     assert caplog.text == ""
     save(BOX, tmp_path / "a.ply", point_data=data)
     np.testing.assert_array_equal(meshio.read(tmp_path / "a.ply").point_data["height"], data["height"])
-    assert "left out the point data 'normal'" in caplog.text
+    assert "omitted the point data 'normal'" in caplog.text
     save(BOX, tmp_path / "a.ply", point_data={"two words": data["height"]})
     np.testing.assert_array_equal(load(tmp_path / "a.ply").points, BOX.points)
     with pytest.raises(MeshFileError, match="names that differ"):
         save(BOX, tmp_path / "b.ply", point_data={"x": data["height"]})
     save(BOX, tmp_path / "a.obj", point_data=data)
-    assert "'height', which OBJ cannot hold" in caplog.text
+    assert "'height', which OBJ cannot store" in caplog.text
     with pytest.raises(MeshFileError, match="3 rows; expected one per point, 26"):
         save(BOX, tmp_path / "b.ply", point_data={"q": np.zeros(3)})
     assert not (tmp_path / "b.ply").exists()
 
 
-@pytest.mark.parametrize("suffix", FORMATS)
+@pytest.mark.parametrize("suffix", MESH_FORMATS)
 def test_failed_write_keeps_the_old_file_and_leaves_no_trace(tmp_path, monkeypatch, suffix):
     path = tmp_path / f"a{suffix}"
     path.write_text("old")
@@ -315,7 +315,7 @@ def test_counts_of_gmsh_files_are_checked_before_the_library_makes_room(tmp_path
     else:
         place = data.index(b"$Nodes\n") + 15
         changed = data[:place] + (10**9).to_bytes(8, "little") + data[place + 8 :]
-    with pytest.raises(ValueError, match=r"promises \d+ nodes"):
+    with pytest.raises(ValueError, match=r"declares \d+ nodes"):
         check_counts(changed)
 
 
@@ -336,7 +336,7 @@ def test_blocks_of_gmsh_4_are_checked_before_the_library_makes_room(tmp_path, bi
             line = data.index(b"\n", start) + 1
             place = data.index(b" %d" % count, line)
             changed = data[:place] + b" 1000000000" + data[place + len(b" %d" % count) :]
-        with pytest.raises(ValueError, match="a block promises"):
+        with pytest.raises(ValueError, match="a block declares"):
             check_counts(changed)
         path.write_bytes(changed)
         with pytest.raises(MeshFileError):

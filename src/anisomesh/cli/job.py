@@ -145,12 +145,12 @@ def run_remesh(
     """
     from importlib.metadata import version
 
-    from anisomesh.estimate import chosen_embedding
+    from anisomesh.resolve import embedding_name
     from anisomesh.options import RemeshOptions
     from anisomesh.pipeline import remesh
 
     source = RemeshOptions(**{name: options[name] for name in ("metric", "embedding", "weights") if name in options})
-    announce_compilation(display, "remesh", *(() if chosen_embedding(source) == "direct" else ("network",)))
+    announce_compilation(display, "remesh", *(() if embedding_name(source) == "direct" else ("network",)))
     result = remesh(surface, on_step=display, **options)
     report = result.report()
     seconds = report["seconds"]

@@ -1,4 +1,4 @@
-"""Writing files so that a reader never sees half of one."""
+"""Atomic writing: a reader never sees an incomplete file, and a line list survives a killed process."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from anisomesh.errors import MeshFileError
 
 @contextmanager
 def atomic_path(path: str | os.PathLike[str]) -> Iterator[Path]:
-    """Yield a temporary path beside ``path`` and rename it to ``path`` when the block ends well.
+    """Yield a temporary path beside ``path`` and rename it to ``path`` when the block succeeds.
 
     Parameters
     ----------
@@ -24,18 +24,18 @@ def atomic_path(path: str | os.PathLike[str]) -> Iterator[Path]:
     Raises
     ------
     MeshFileError
-        If the folder does not exist or cannot be written, the disk is full, or ``path`` is not a plain file.
+        If the folder does not exist or cannot be written, the disk is full, or ``path`` is not a regular file.
 
     Notes
     -----
-    The temporary path has the suffix of ``path``, since libraries choose the format by it. When the block
-    raises anything, KeyboardInterrupt included, the temporary file is removed and ``path`` is left as it was.
+    The temporary path has the suffix of ``path``, since libraries choose the format by it. If the block raises,
+    KeyboardInterrupt included, the temporary file is removed and ``path`` is unchanged.
     """
     target = Path(path).resolve()
     if not target.parent.is_dir():
         raise MeshFileError(f"{path}: cannot be written: there is no folder {target.parent}; create it first")
     if target.exists() and not target.is_file():
-        raise MeshFileError(f"{path}: cannot be written: it exists and is not a plain file")
+        raise MeshFileError(f"{path}: cannot be written: it exists and is not a plain file; choose another name")
     temporary = target.with_name(f".{target.stem[:80]}.{secrets.token_hex(4)}{target.suffix}")
     try:
         yield temporary
@@ -49,7 +49,7 @@ def atomic_path(path: str | os.PathLike[str]) -> Iterator[Path]:
 
 
 def append_line(path: Path, line: str) -> None:
-    """Write a line at the end of a file, to the disk; the file is made if it is not there."""
+    """Append a line to a file, which is created if missing, and flush it to the disk."""
     with path.open("a", encoding="utf-8") as file:
         file.write(line + "\n")
         file.flush()
@@ -57,7 +57,7 @@ def append_line(path: Path, line: str) -> None:
 
 
 def drop_cut_line(path: Path) -> None:
-    """Take away what is left of a last line that was being written when the process ended."""
+    """Remove an incomplete last line, left by a process that was killed while writing it."""
     if path.exists():
         content = path.read_bytes()
         if content and not content.endswith(b"\n"):

@@ -1,4 +1,4 @@
-"""Surfaces from what other libraries call a mesh."""
+"""Conversion of arrays and of the mesh objects of other libraries to surfaces."""
 
 from __future__ import annotations
 
@@ -12,12 +12,19 @@ from anisomesh.mesh.surface import Surface
 
 
 def as_surface(mesh: Any, faces: npt.NDArray[Any] | None = None) -> Surface:
-    """Return a :class:`Surface` from points and faces, a surface, a ``trimesh.Trimesh`` or a ``pyvista.PolyData``.
+    """Convert a mesh to a :class:`Surface`.
+
+    Parameters
+    ----------
+    mesh
+        Points (V, 3) together with ``faces``, or a :class:`Surface`, a ``trimesh.Trimesh`` or a ``pyvista.PolyData``.
+    faces
+        Point indices (F, 3) if ``mesh`` is an array of points.
 
     Raises
     ------
     MeshError
-        If the object is none of these, or has faces that are no triangles.
+        If the object is none of these, has faces other than triangles, or its arrays are not a mesh.
     """
     if isinstance(mesh, Surface):
         return mesh
@@ -25,7 +32,7 @@ def as_surface(mesh: Any, faces: npt.NDArray[Any] | None = None) -> Surface:
         return Surface(np.asarray(mesh), np.asarray(faces))
     if hasattr(mesh, "regular_faces"):  # pyvista
         if not mesh.is_all_triangles:
-            raise MeshError("the PyVista mesh has faces that are no triangles; call its triangulate() first")
+            raise MeshError("the PyVista mesh has faces other than triangles; call its triangulate() first")
         return Surface(np.asarray(mesh.points), np.asarray(mesh.regular_faces))
     if hasattr(mesh, "vertices") and hasattr(mesh, "faces"):  # trimesh
         return Surface(np.asarray(mesh.vertices), np.asarray(mesh.faces))

@@ -1,4 +1,4 @@
-"""Reading and writing mesh files."""
+"""Read and write mesh files; the extension names the format."""
 
 from __future__ import annotations
 
@@ -12,27 +12,28 @@ import numpy as np
 import numpy.typing as npt
 
 from anisomesh.errors import MeshFileError
-from anisomesh.io import external, ply, polygons, stl, text_formats
+from anisomesh.io import ply, polygons, stl, text_formats, third_party_formats
 from anisomesh.io.atomic import atomic_path
 from anisomesh.mesh.surface import Surface
 
 logger = logging.getLogger(__name__)
 
-PointData = Mapping[str, npt.NDArray[Any]]
+PointData = Mapping[str, npt.NDArray[Any]]  # arrays (V,) or (V, k) by name
 
-READERS: dict[str, Callable[[bytes], polygons.PolygonSoup]] = {
+_READERS: dict[str, Callable[[bytes], polygons.PolygonSoup]] = {
     ".obj": text_formats.read_obj,
     ".off": text_formats.read_off,
     ".ply": ply.read_ply,
     ".stl": stl.read_stl,
-    ".glb": external.read_glb,
+    ".glb": third_party_formats.read_glb,
     ".mesh": text_formats.read_medit,
 }
-READERS_BY_PATH: dict[str, Callable[[Path], polygons.PolygonSoup]] = {
-    ".vtu": external.read_vtu,
-    ".msh": external.read_msh,
+_PATH_READERS: dict[str, Callable[[Path], polygons.PolygonSoup]] = {
+    ".vtu": third_party_formats.read_vtu,
+    ".msh": third_party_formats.read_msh,
 }
-FORMATS = (*READERS, *READERS_BY_PATH)
+MESH_FORMATS = (*_READERS, *_PATH_READERS)
+"""Extensions that :func:`load` and :func:`save` know, in lower case with the dot."""
 
 
 def load(path: str | os.PathLike[str]) -> Surface:
@@ -41,34 +42,32 @@ def load(path: str | os.PathLike[str]) -> Surface:
     Parameters
     ----------
     path
-        A file whose extension, in any case, names its format: .obj, .off, .ply, .stl, .glb, .vtu, .msh (Gmsh)
-        or .mesh (MEDIT).
+        A file with the extension .obj, .off, .ply, .stl, .glb, .vtu, .msh (Gmsh) or .mesh (MEDIT), in either case.
 
     Returns
     -------
     Surface
-        The points in the order of the file, as float64, and the polygons as triangles. Nothing is repaired:
-        unused points and degenerate faces are kept.
+        The points in file order, as float64, and the polygons as triangles. Nothing is repaired: unused points and
+        degenerate faces are kept.
 
     Raises
     ------
     MeshFileError
-        In one line that names the file, if there is no such file, the format is unknown, the file is empty,
-        truncated or malformed, an index is out of range, a coordinate is not finite, or there is no face.
+        If the file does not exist, its format is unknown, it is empty, truncated or malformed, an index is out of
+        range, a coordinate is not finite, or there is no face.
 
     Notes
     -----
-    A quadrilateral is split along its shorter diagonal, larger polygons into fans. Lines and volume cells are
-    left out. STL holds unconnected triangles; their corners are welded where they are equal, and the log
-    says so.
+    Quadrilaterals are split along their shorter diagonal, larger polygons into fans. Lines and volume cells are
+    ignored. STL stores unconnected triangles; corners with equal coordinates are welded, which is logged.
     """
     path = Path(path)
     suffix = path.suffix.lower()
     if path.is_dir():
         raise MeshFileError(f"{path}: is a folder; expected a mesh file")
     if not path.exists():
-        raise MeshFileError(f"{path}: no such file")
-    if suffix not in FORMATS:
+        raise MeshFileError(f"{path}: no such file; expected a mesh file")
+    if suffix not in MESH_FORMATS:
         raise MeshFileError(_unknown_format(path))
     try:
         data = path.read_bytes()
@@ -77,36 +76,36 @@ def load(path: str | os.PathLike[str]) -> Surface:
     if not data.strip():
         raise MeshFileError(f"{path}: the file is empty; expected a mesh")
     try:
-        soup = READERS[suffix](data) if suffix in READERS else READERS_BY_PATH[suffix](path)
-        polygons.check(soup)
+        soup = _READERS[suffix](data) if suffix in _READERS else _PATH_READERS[suffix](path)
+        polygons.validate(soup)
         return Surface(soup.points, polygons.triangulate(soup))
     except Exception as error:
-        # Readers say what is wrong as ValueError; anything else is a library stumbling over the file.
-        reason = (
-            str(error) if type(error) is ValueError else f"malformed or truncated ({type(error).__name__}: {error})"
-        )
+        # Our readers raise ValueError with an explanation; other exceptions come from libraries.
+        reason = str(error)
+        if type(error) is not ValueError:
+            reason = f"malformed or truncated ({type(error).__name__}: {error})"
         reason = " ".join(reason.split())
         raise MeshFileError(f"{path}: cannot be read as {suffix[1:].upper()}: {reason}") from error
 
 
 def save(surface: Surface, path: str | os.PathLike[str], *, point_data: PointData | None = None) -> None:
-    """Write a surface mesh; the file appears only when it is complete.
+    """Write a surface mesh atomically.
 
     Parameters
     ----------
     surface
-        What to write.
+        The mesh to write.
     path
-        The file; its extension names the format, see :func:`load`. An existing file is replaced.
+        The file, with one of the extensions of :func:`load`. An existing file is replaced.
     point_data
-        Arrays (V,) or (V, k) to write beside the points. VTU takes all of them, PLY scalars only; what a format
-        cannot hold is left out and the log says so.
+        Arrays (V,) or (V, k) by name. VTU stores all of them, PLY scalars only; arrays that the format cannot store are
+        omitted with a warning in the log.
 
     Raises
     ------
     MeshFileError
-        If the format is unknown, the folder is missing or cannot be written, the disk is full, or a coordinate
-        does not fit the format.
+        If the format is unknown, the folder is missing or cannot be written, the disk is full, an array has the wrong
+        length, or a coordinate does not fit the format.
 
     Notes
     -----
@@ -114,20 +113,20 @@ def save(surface: Surface, path: str | os.PathLike[str], *, point_data: PointDat
     """
     path = Path(path)
     suffix = path.suffix.lower()
-    if suffix not in FORMATS:
+    if suffix not in MESH_FORMATS:
         raise MeshFileError(_unknown_format(path))
     data = {name: np.asarray(values) for name, values in (point_data or {}).items()}
     for name, values in data.items():
         if len(values) != surface.n_points:
             raise MeshFileError(f"{path}: {name} has {len(values)} rows; expected one per point, {surface.n_points}")
-    kept = {
+    stored = {
         name: values for name, values in data.items() if suffix == ".vtu" or (suffix == ".ply" and values.ndim == 1)
     }
-    for name in data.keys() - kept.keys():
-        logger.warning("%s: left out the point data %r, which %s cannot hold", path, name, suffix[1:].upper())
+    for name in data.keys() - stored.keys():
+        logger.warning("%s: omitted the point data %r, which %s cannot store", path, name, suffix[1:].upper())
     with atomic_path(path) as temporary:
         try:
-            _write(surface, temporary, kept)
+            _write(surface, temporary, stored)
         except ValueError as error:
             raise MeshFileError(f"{path}: cannot be written: {error}") from error
 
@@ -146,12 +145,13 @@ def _write(surface: Surface, path: Path, data: dict[str, npt.NDArray[Any]]) -> N
         case ".stl":
             path.write_bytes(stl.stl_bytes(points, faces))
         case ".glb":
-            path.write_bytes(external.glb_bytes(points, faces))
+            path.write_bytes(third_party_formats.glb_bytes(points, faces))
         case ".vtu":
-            external.write_vtu(path, points, faces, data)
+            third_party_formats.write_vtu(path, points, faces, data)
         case _:
-            external.write_msh(path, points, faces)
+            third_party_formats.write_msh(path, points, faces)
 
 
 def _unknown_format(path: Path) -> str:
-    return f"{path}: unknown format {path.suffix or '(no extension)'}; known are {', '.join(sorted(FORMATS))}"
+    expected = ", ".join(sorted(MESH_FORMATS))
+    return f"{path}: unknown format {path.suffix or '(no extension)'}; expected one of {expected}"

@@ -1,4 +1,4 @@
-"""Polygons as files hold them, and the triangles they become."""
+"""Polygon soups, as read from files, and their triangulation."""
 
 from __future__ import annotations
 
@@ -8,39 +8,37 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from anisomesh._arrays import Points
-
 
 @dataclass(frozen=True, kw_only=True)
 class PolygonSoup:
-    """What a reader found in a file, not validated yet.
+    """Polygons as a reader found them in a file, not validated.
 
-    Parameters
+    Attributes
     ----------
     points
         Coordinates (V, 3).
     corners
-        Point indices of all polygons, one after the other.
+        Point indices (sum of sizes,) of all polygons, concatenated.
     sizes
-        Number of corners of each polygon.
+        Number of corners of each polygon (P,).
     """
 
     points: npt.NDArray[np.float64]
     corners: npt.NDArray[np.int64]
     sizes: npt.NDArray[np.int64]
 
+    @classmethod
+    def from_array(cls, points: npt.NDArray[Any], polygons: npt.NDArray[Any]) -> PolygonSoup:
+        """Return the soup of polygons (P, k) with k corners each."""
+        return cls(
+            points=np.asarray(points, dtype=np.float64),
+            corners=np.asarray(polygons, dtype=np.int64).ravel(),
+            sizes=np.full(len(polygons), polygons.shape[1], dtype=np.int64),
+        )
 
-def of_equal_size(points: npt.NDArray[Any], polygons: npt.NDArray[Any]) -> PolygonSoup:
-    """Return the soup of polygons (n, k) that all have k corners."""
-    return PolygonSoup(
-        points=np.asarray(points, dtype=np.float64),
-        corners=np.asarray(polygons, dtype=np.int64).ravel(),
-        sizes=np.full(len(polygons), polygons.shape[1], dtype=np.int64),
-    )
 
-
-def check(soup: PolygonSoup) -> None:
-    """Raise ValueError if the soup has no polygon, an index out of range or a coordinate that is not finite."""
+def validate(soup: PolygonSoup) -> None:
+    """Raise ValueError if there is no polygon, or one with fewer than 3 corners, a bad index or coordinate."""
     if len(soup.sizes) == 0:
         raise ValueError("it has no face")
     few = np.flatnonzero(soup.sizes < 3)
@@ -58,25 +56,19 @@ def check(soup: PolygonSoup) -> None:
 
 
 def triangulate(soup: PolygonSoup) -> npt.NDArray[np.int64]:
-    """Return the triangles (F, 3) of the polygons, in the order of the polygons.
+    """Return triangles (F, 3) in the order of their polygons.
 
-    Notes
-    -----
-    A quadrilateral is split along its shorter diagonal, a larger polygon into a fan from its first corner.
+    Quadrilaterals are split along their shorter diagonal, larger polygons into fans from their first corner.
     """
     sizes, corners = soup.sizes, soup.corners
     if (sizes == 3).all():
         return corners.reshape(-1, 3)
     first = np.cumsum(sizes) - sizes
     polygon = np.repeat(np.arange(len(sizes)), sizes - 2)
-    turn = np.arange(len(polygon)) - np.repeat(np.cumsum(sizes - 2) - (sizes - 2), sizes - 2)
+    rank = np.arange(len(polygon)) - np.repeat(np.cumsum(sizes - 2) - (sizes - 2), sizes - 2)
     shift = np.zeros(len(sizes), dtype=np.int64)
     quads = np.flatnonzero(sizes == 4)
     a, b, c, d = (soup.points[corners[first[quads] + k]] for k in range(4))
-    shift[quads] = _length(b, d) < _length(a, c)
-    local = np.stack([np.zeros_like(turn), turn + 1, turn + 2], axis=1) + shift[polygon, None]
+    shift[quads] = np.linalg.norm(b - d, axis=1) < np.linalg.norm(a - c, axis=1)
+    local = np.stack([np.zeros_like(rank), rank + 1, rank + 2], axis=1) + shift[polygon, None]
     return corners[first[polygon, None] + local % sizes[polygon, None]]
-
-
-def _length(a: Points, b: Points) -> npt.NDArray[np.float64]:
-    return np.asarray(np.linalg.norm(a - b, axis=1))

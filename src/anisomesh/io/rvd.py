@@ -1,4 +1,4 @@
-"""Export of Voronoi cells as polygons, one colour per cell."""
+"""Export of restricted Voronoi cells as coloured polygons."""
 
 from __future__ import annotations
 
@@ -14,21 +14,22 @@ from anisomesh._arrays import Points
 from anisomesh.errors import MeshFileError
 from anisomesh.io.atomic import atomic_path
 
-N_COLOURS = 12
+N_COLOURS = 12  # colours of the palette; heuristic
+_HASH_MULTIPLIER = 2654435761  # near 2^32 / golden ratio: multiplicative hashing, Knuth, TAOCP vol. 3, section 6.4
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class PolygonMesh:
-    """Convex polygons in space.
+    """Convex polygons in 3-D, each a part of a Voronoi cell.
 
     Attributes
     ----------
     points
-        Points (Q, 3); polygon p uses points ``offset[p]`` to ``offset[p + 1] - 1`` in order.
+        Points (Q, 3) in model units; polygon p has the points ``offset[p]`` to ``offset[p + 1] - 1`` in order.
     offset
         First point of each polygon (P + 1,).
     cell
-        Cell component of each polygon (P,), which is also the vertex of the dual mesh.
+        Cell component of each polygon (P,), which is also its vertex of the dual mesh.
     """
 
     points: Points
@@ -37,22 +38,22 @@ class PolygonMesh:
 
     @property
     def colour(self) -> npt.NDArray[np.int32]:
-        """Colour number of each polygon (P,), spread so that neighbouring cells rarely share one."""
-        return (self.cell.astype(np.int64) * 2654435761 % 2**32 % N_COLOURS).astype(np.int32)
+        """Index of the colour of each polygon (P,), a hash of its cell: neighbouring cells rarely share a colour."""
+        return (self.cell.astype(np.int64) * _HASH_MULTIPLIER % 2**32 % N_COLOURS).astype(np.int32)
 
 
 def save_polygons(mesh: PolygonMesh, path: str | os.PathLike[str]) -> None:
-    """Write polygons as VTU (cell data ``cell`` and ``colour``) or OBJ (one material per colour).
+    """Write polygons as VTU (cell data ``cell`` and ``colour``) or OBJ (a group per cell, a material per colour).
 
     Raises
     ------
     MeshFileError
-        If the suffix is neither .vtu nor .obj, or the file cannot be written.
+        If the extension is neither .vtu nor .obj, or the file cannot be written.
     """
     path = Path(path)
     writers = {".vtu": _write_vtu, ".obj": _write_obj}
     if path.suffix.lower() not in writers:
-        raise MeshFileError(f"{path}: a diagram is written as .vtu or .obj, not {path.suffix or 'without suffix'}")
+        raise MeshFileError(f"{path}: unknown format {path.suffix or '(no extension)'}; expected .vtu or .obj")
     with atomic_path(path) as temporary:
         writers[path.suffix.lower()](mesh, Path(temporary))
 

@@ -1,4 +1,4 @@
-"""The STL format, binary and text: three unconnected points per face."""
+"""The STL format, binary and text: unconnected triangles."""
 
 from __future__ import annotations
 
@@ -8,53 +8,52 @@ import re
 import numpy as np
 
 from anisomesh._arrays import Faces, Points
-from anisomesh.io.polygons import PolygonSoup, of_equal_size
+from anisomesh.io.polygons import PolygonSoup
 from anisomesh.mesh.geometry import face_cross, unit
 from anisomesh.mesh.weld import coincident
 
 logger = logging.getLogger(__name__)
 
-HEADER_BYTES = 84
-TRIANGLE = np.dtype([("normal", "<f4", 3), ("corners", "<f4", (3, 3)), ("attribute", "<u2")])
+_HEADER_BYTES = 84  # of a binary file: 80 of text and the number of triangles
+_TRIANGLE = np.dtype([("normal", "<f4", 3), ("corners", "<f4", (3, 3)), ("attribute", "<u2")])
 
 
 def read_stl(data: bytes) -> PolygonSoup:
-    """Read an STL file and weld its corners where their coordinates are equal.
+    """Read an STL file and weld corners with equal coordinates, which is logged.
 
     Notes
     -----
-    Text or binary is decided by the size a binary file must have, since binary headers can begin with
-    "solid" as well. The soup is welded because STL stores no connectivity at all; the log says so.
+    A file is binary if its size fits its number of triangles, since headers of binary files can begin with "solid"
+    as well.
     """
-    promised = int.from_bytes(data[80:84], "little") if len(data) >= HEADER_BYTES else -1
-    if len(data) == HEADER_BYTES + promised * TRIANGLE.itemsize:
-        with np.errstate(invalid="ignore"):  # NaN is refused later, with its place
-            corners = np.frombuffer(data, dtype=TRIANGLE, offset=HEADER_BYTES)["corners"].astype(np.float64)
+    declared = int.from_bytes(data[80:84], "little") if len(data) >= _HEADER_BYTES else -1
+    if len(data) == _HEADER_BYTES + declared * _TRIANGLE.itemsize:
+        with np.errstate(invalid="ignore"):  # NaN is reported by polygons.validate
+            corners = np.frombuffer(data, dtype=_TRIANGLE, offset=_HEADER_BYTES)["corners"].astype(np.float64)
         corners = corners.reshape(-1, 3)
     elif data.lstrip()[:5].lower() == b"solid" and b"facet" in data[:4096].lower():
         corners = _text_corners(data.lower())
-    elif promised < 0:
-        raise ValueError(f"truncated: {len(data)} bytes; a binary STL file has at least {HEADER_BYTES}")
+    elif declared < 0:
+        raise ValueError(f"truncated: {len(data)} bytes; a binary STL file has at least {_HEADER_BYTES}")
     else:
-        expected = HEADER_BYTES + promised * TRIANGLE.itemsize
+        expected = _HEADER_BYTES + declared * _TRIANGLE.itemsize
         raise ValueError(
-            f"truncated or malformed: it promises {promised} triangles, that is {expected} bytes, but has {len(data)}"
+            f"truncated or malformed: it declares {declared} triangles, that is {expected} bytes, but has {len(data)}"
         )
-    lowest = coincident(corners)
-    kept, inverse = np.unique(lowest, return_inverse=True)
-    logger.info("STL stores no connectivity: welded %d corners into %d points", len(corners), len(kept))
-    return of_equal_size(corners[kept], inverse.reshape(-1, 3))
+    points, inverse = np.unique(coincident(corners), return_inverse=True)
+    logger.info("STL stores no connectivity: welded %d corners into %d points", len(corners), len(points))
+    return PolygonSoup.from_array(corners[points], inverse.reshape(-1, 3))
 
 
 def stl_bytes(points: Points, faces: Faces) -> bytes:
-    """Return a binary STL file; coordinates are rounded to float32."""
-    rows = np.zeros(len(faces), dtype=TRIANGLE)
+    """Return the content of a binary STL file; coordinates are rounded to float32."""
+    rows = np.zeros(len(faces), dtype=_TRIANGLE)
     with np.errstate(over="ignore"):
         rows["corners"] = points[faces]
     if not np.isfinite(rows["corners"]).all():
         raise ValueError("coordinates beyond 3.4e38 do not fit the float32 of STL; use PLY instead")
     rows["normal"] = unit(face_cross(points, faces))
-    return b"binary STL".ljust(HEADER_BYTES - 4) + len(faces).to_bytes(4, "little") + rows.tobytes()
+    return b"binary STL".ljust(_HEADER_BYTES - 4) + len(faces).to_bytes(4, "little") + rows.tobytes()
 
 
 def _text_corners(text: bytes) -> Points:

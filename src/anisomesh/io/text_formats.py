@@ -1,7 +1,7 @@
 """Strict readers and exact writers of the text formats OBJ, OFF and MEDIT (.mesh).
 
-Readers take the bytes of a file and raise ValueError, saying where, on anything they cannot trust. Writers
-print every coordinate with as many digits as it takes to read the same float64 back.
+Readers take the bytes of a file and raise ValueError with the line if it is malformed or truncated. Writers print
+coordinates with enough digits to restore the same float64.
 """
 
 from __future__ import annotations
@@ -15,7 +15,7 @@ import numpy.typing as npt
 from anisomesh._arrays import Faces, Points
 from anisomesh.io.polygons import PolygonSoup
 
-MEDIT_ROW = {b"Vertices": 0, b"Triangles": 3, b"Quadrilaterals": 4}
+_MEDIT_CORNERS = {b"Vertices": 0, b"Triangles": 3, b"Quadrilaterals": 4}  # indices per row of the sections to read
 
 
 def read_obj(data: bytes) -> PolygonSoup:
@@ -23,15 +23,15 @@ def read_obj(data: bytes) -> PolygonSoup:
 
     Notes
     -----
-    Texture and normal indices are ignored, so that seams do not split points. Negative indices count back
-    from the last point before the line; a backslash at the end of a line continues it.
+    Texture and normal indices are ignored, so that texture seams do not split points. Negative indices count back from
+    the last point before the line; a backslash at the end of a line continues it.
     """
     lines = re.sub(rb"\\\r?\n", b" ", data).splitlines()
     kinds = np.array([line[:2].replace(b"\t", b" ") for line in map(bytes.lstrip, lines)], dtype="S2")
     point_lines, face_lines = np.flatnonzero(kinds == b"v "), np.flatnonzero(kinds == b"f ")
-    bare = np.flatnonzero((kinds == b"v") | (kinds == b"f"))
-    if len(bare):
-        raise ValueError(f"line {bare[0] + 1} is cut off: {lines[bare[0]][:40]!r}")
+    truncated = np.flatnonzero((kinds == b"v") | (kinds == b"f"))
+    if len(truncated):
+        raise ValueError(f"line {truncated[0] + 1} is cut off: {lines[truncated[0]][:40]!r}")
     points = _coordinates(lines, point_lines, skip=1)
     tokens = [re.sub(rb"/\S*", b"", lines[k].partition(b"#")[0]).split()[1:] for k in face_lines]
     sizes = np.array([len(row) for row in tokens], dtype=np.int64)
@@ -39,13 +39,13 @@ def read_obj(data: bytes) -> PolygonSoup:
     if (raw == 0).any():
         line = np.repeat(face_lines, sizes)[np.flatnonzero(raw == 0)[0]]
         raise ValueError(f"line {line + 1} refers to point 0; OBJ counts from 1")
-    before = np.repeat(np.searchsorted(point_lines, face_lines), sizes)
-    corners = np.where(raw > 0, raw - 1, raw + before)
+    n_points_before = np.repeat(np.searchsorted(point_lines, face_lines), sizes)
+    corners = np.where(raw > 0, raw - 1, raw + n_points_before)
     return PolygonSoup(points=points, corners=corners, sizes=sizes)
 
 
 def read_off(data: bytes) -> PolygonSoup:
-    """Read an Object File Format file: OFF, COFF, NOFF, CNOFF or STOFF, as text; extra columns are ignored."""
+    """Read a text file in Object File Format (OFF, COFF, NOFF, CNOFF or STOFF); extra columns are ignored."""
     rows = [(k, line.partition(b"#")[0].strip()) for k, line in enumerate(data.splitlines())]
     numbers = np.array([k for k, line in rows if line], dtype=np.int64)
     lines = [line for _, line in rows if line]
@@ -59,7 +59,7 @@ def read_off(data: bytes) -> PolygonSoup:
     n_points, n_faces = int(counts[0]), int(counts[1])
     if len(lines) < start + n_points + n_faces:
         raise ValueError(
-            f"truncated: it promises {n_points} points and {n_faces} faces but {len(lines) - start} lines follow"
+            f"truncated: it declares {n_points} points and {n_faces} faces but {len(lines) - start} lines follow"
         )
     points = _coordinates(lines, np.arange(start, start + n_points), skip=0, numbers=numbers)
     face_lines = np.arange(start + n_points, start + n_points + n_faces)
@@ -73,7 +73,7 @@ def read_off(data: bytes) -> PolygonSoup:
 
 
 def read_medit(data: bytes) -> PolygonSoup:
-    """Read points, triangles and quadrilaterals of a MEDIT .mesh text file; other entities are ignored."""
+    """Read the vertices, triangles and quadrilaterals of a MEDIT .mesh text file; other sections are ignored."""
     tokens = re.sub(rb"#[^\n]*", b"", data).split()
     if not tokens or not tokens[0].startswith(b"MeshVersionFormatted"):
         raise ValueError("it does not begin with MeshVersionFormatted as a MEDIT text file does")
@@ -82,19 +82,19 @@ def read_medit(data: bytes) -> PolygonSoup:
     for k, end in zip(words, [*words[1:], len(tokens)], strict=True):
         if tokens[k] == b"Dimension" and k + 1 < end:
             dimension = int(tokens[k + 1])
-        if tokens[k] in MEDIT_ROW:
+        if tokens[k] in _MEDIT_CORNERS:
             sections[tokens[k]] = tokens[k + 1 : end]
     if dimension not in (2, 3):
         raise ValueError(f"its dimension is {dimension}; expected 2 or 3")
     points = np.zeros((0, 3))
     corners, sizes = [np.zeros(0, dtype=np.int64)], [np.zeros(0, dtype=np.int64)]
     for name, body in sections.items():
-        width = MEDIT_ROW[name] or dimension
+        width = _MEDIT_CORNERS[name] or dimension
         rows = _medit_rows(name.decode(), body, width)
         if name == b"Vertices":
             points = np.pad(rows, ((0, 0), (0, 3 - width)))
         else:
-            with np.errstate(invalid="ignore"):  # what is no index is refused later as out of range
+            with np.errstate(invalid="ignore"):  # NaN becomes an index that polygons.validate reports
                 corners.append(rows.astype(np.int64).ravel() - 1)
             sizes.append(np.full(len(rows), width, dtype=np.int64))
     others = sorted({tokens[k].decode(errors="replace") for k in words} & {"Tetrahedra", "Hexahedra", "Prisms"})
@@ -104,40 +104,45 @@ def read_medit(data: bytes) -> PolygonSoup:
 
 
 def obj_text(points: Points, faces: Faces) -> str:
-    """Return the text of an OBJ file."""
-    return _rows("v %r %r %r\n", points) + _rows("f %d %d %d\n", faces + 1)
+    """Return the content of an OBJ file."""
+    return _format_rows("v %r %r %r\n", points) + _format_rows("f %d %d %d\n", faces + 1)
 
 
 def off_text(points: Points, faces: Faces) -> str:
-    """Return the text of an OFF file."""
-    return f"OFF\n{len(points)} {len(faces)} 0\n" + _rows("%r %r %r\n", points) + _rows("3 %d %d %d\n", faces)
+    """Return the content of an OFF file."""
+    return (
+        f"OFF\n{len(points)} {len(faces)} 0\n"
+        + _format_rows("%r %r %r\n", points)
+        + _format_rows("3 %d %d %d\n", faces)
+    )
 
 
 def medit_text(points: Points, faces: Faces) -> str:
-    """Return the text of a MEDIT .mesh file, version 2 (float64)."""
-    vertices = f"Vertices\n{len(points)}\n" + _rows("%r %r %r 0\n", points)
-    triangles = f"Triangles\n{len(faces)}\n" + _rows("%d %d %d 0\n", faces + 1)
+    """Return the content of a MEDIT .mesh text file, version 2 (float64)."""
+    vertices = f"Vertices\n{len(points)}\n" + _format_rows("%r %r %r 0\n", points)
+    triangles = f"Triangles\n{len(faces)}\n" + _format_rows("%d %d %d 0\n", faces + 1)
     return f"MeshVersionFormatted 2\nDimension 3\n{vertices}{triangles}End\n"
 
 
-def _rows(pattern: str, table: npt.NDArray[np.float64] | npt.NDArray[np.int32]) -> str:
+def _format_rows(pattern: str, table: npt.NDArray[np.float64] | npt.NDArray[np.int32]) -> str:
     return (pattern * len(table)) % tuple(table.ravel().tolist())
 
 
 def _coordinates(
     lines: list[bytes], chosen: npt.NDArray[np.int64], *, skip: int, numbers: npt.NDArray[np.int64] | None = None
 ) -> npt.NDArray[np.float64]:
-    """Return the three numbers after ``skip`` words of the chosen lines."""
+    """Parse three coordinates (n, 3) after ``skip`` words of the chosen lines; ``numbers`` are the line numbers."""
     rows = [lines[k].partition(b"#")[0].split()[skip : skip + 3] for k in chosen]
     try:
         return np.array([list(map(float, row)) for row in rows], dtype=np.float64).reshape(len(rows), 3)
     except ValueError:
-        where = next(k for k, row in zip(chosen, rows, strict=True) if len(row) < 3 or not _all_numbers(row))
-        number = where if numbers is None else numbers[where]
-        raise ValueError(f"line {number + 1} should give three coordinates: {lines[where][:60]!r}") from None
+        bad = next(k for k, row in zip(chosen, rows, strict=True) if len(row) < 3 or not _all_numbers(row))
+        number = bad if numbers is None else numbers[bad]
+        raise ValueError(f"line {number + 1} should give three coordinates: {lines[bad][:60]!r}") from None
 
 
 def _integers(rows: list[list[bytes]], numbers: npt.NDArray[np.int64]) -> npt.NDArray[np.int64]:
+    """Parse all words of rows with these line numbers as integers, concatenated."""
     try:
         return np.array([int(token) for row in rows for token in row], dtype=np.int64)
     except (ValueError, OverflowError):
@@ -153,14 +158,14 @@ def _all_numbers(words: Iterable[bytes]) -> bool:
 
 
 def _medit_rows(name: str, body: list[bytes], width: int) -> npt.NDArray[np.float64]:
-    """Return the rows of a section without their last column, the reference number."""
+    """Return the rows (n, width) of a MEDIT section, without the reference number at the end of each row."""
     if not body or not body[0].isdigit():
         raise ValueError(f"truncated: the section {name} has no count")
     count = int(body[0])
     if len(body) - 1 < count * (width + 1):
-        raise ValueError(f"truncated: {name} promises {count} rows of {width + 1} but {len(body) - 1} numbers follow")
+        raise ValueError(f"truncated: {name} declares {count} rows of {width + 1} but {len(body) - 1} numbers follow")
     try:
         rows = np.array(list(map(float, body[1 : 1 + count * (width + 1)])), dtype=np.float64)
     except ValueError as error:
-        raise ValueError(f"the section {name}: {error}") from None
+        raise ValueError(f"malformed: the section {name} should give numbers: {error}") from None
     return rows.reshape(count, width + 1)[:, :width]

@@ -1,4 +1,7 @@
-"""The formats that meshio and trimesh read and write for us: VTU, MSH (Gmsh) and GLB."""
+"""Formats read and written by meshio (VTU, Gmsh MSH) and trimesh (GLB).
+
+Readers raise ValueError with an explanation where a file is wrong; what the libraries print goes to the log.
+"""
 
 from __future__ import annotations
 
@@ -15,7 +18,7 @@ import numpy.typing as npt
 
 from anisomesh._arrays import Faces, Points
 from anisomesh.io.gmsh_counts import check_counts
-from anisomesh.io.polygons import PolygonSoup, of_equal_size
+from anisomesh.io.polygons import PolygonSoup
 
 logger = logging.getLogger(__name__)
 
@@ -36,14 +39,14 @@ def read_msh(path: Path) -> PolygonSoup:
 
 
 def read_glb(data: bytes) -> PolygonSoup:
-    """Read all meshes of a binary glTF scene, moved to their places in the scene."""
+    """Read all meshes of a binary glTF scene, with the transformations of the scene applied."""
     import trimesh
 
-    promised = int.from_bytes(data[8:12], "little")
+    declared = int.from_bytes(data[8:12], "little")
     if data[:4] != b"glTF":
-        raise ValueError("it does not begin with the word glTF")
-    if promised > len(data):
-        raise ValueError(f"truncated: it promises {promised} bytes but has {len(data)}")
+        raise ValueError("it does not begin with the word glTF as a GLB file does")
+    if declared > len(data):
+        raise ValueError(f"truncated: it declares {declared} bytes but has {len(data)}")
     scene = _quietly(lambda: trimesh.load_scene(io.BytesIO(data), file_type="glb", process=False))
     meshes = [mesh for mesh in _quietly(scene.dump) if isinstance(mesh, trimesh.Trimesh)]
     if not meshes:
@@ -51,11 +54,11 @@ def read_glb(data: bytes) -> PolygonSoup:
     first = np.cumsum([0, *(len(mesh.vertices) for mesh in meshes)])
     points = np.concatenate([np.asarray(mesh.vertices, dtype=np.float64) for mesh in meshes])
     faces = [np.asarray(mesh.faces, dtype=np.int64) + start for mesh, start in zip(meshes, first, strict=False)]
-    return of_equal_size(points, np.concatenate(faces))
+    return PolygonSoup.from_array(points, np.concatenate(faces))
 
 
 def write_vtu(path: Path, points: Points, faces: Faces, point_data: Mapping[str, npt.NDArray[Any]]) -> None:
-    """Write a VTK unstructured grid with data per point, compressed, float64."""
+    """Write a compressed VTK unstructured grid in float64, with data per point."""
     import meshio
 
     mesh = meshio.Mesh(points, [("triangle", faces)], point_data=dict(point_data))
@@ -63,7 +66,7 @@ def write_vtu(path: Path, points: Points, faces: Faces, point_data: Mapping[str,
 
 
 def write_msh(path: Path, points: Points, faces: Faces) -> None:
-    """Write a Gmsh file, version 2.2, binary, float64."""
+    """Write a binary Gmsh file, version 2.2, in float64."""
     import meshio
 
     tags = [np.ones(len(faces), dtype=np.int32)]
@@ -72,7 +75,7 @@ def write_msh(path: Path, points: Points, faces: Faces) -> None:
 
 
 def glb_bytes(points: Points, faces: Faces) -> bytes:
-    """Return a binary glTF file; coordinates are rounded to float32."""
+    """Return the content of a binary glTF file; coordinates are rounded to float32."""
     import trimesh
 
     if float(np.abs(points).max()) > float(np.finfo(np.float32).max):
@@ -82,6 +85,7 @@ def glb_bytes(points: Points, faces: Faces) -> bytes:
 
 
 def _surface_cells(mesh: Any) -> PolygonSoup:
+    """Return the triangles, quadrilaterals and polygons of a meshio mesh."""
     points = np.asarray(mesh.points, dtype=np.float64)
     points = np.pad(points, ((0, 0), (0, 3 - points.shape[1])))
     blocks = [
@@ -100,24 +104,24 @@ def _surface_cells(mesh: Any) -> PolygonSoup:
 
 
 def _quietly(call: Callable[[], Any]) -> Any:
-    """Return what ``call`` returns; what it prints goes to the log, an attempt to exit becomes ValueError."""
-    with _captured() as noise:
+    """Call a library function, log what it prints, and turn SystemExit into ValueError."""
+    with _captured_output() as output:
         try:
             return call()
         except SystemExit as error:
-            raise ValueError(" ".join(noise.getvalue().split()) or "the library gave up") from error
+            raise ValueError(" ".join(output.getvalue().split()) or "the library cannot read the file") from error
 
 
 @contextlib.contextmanager
-def _captured() -> Iterator[io.StringIO]:
-    noise = io.StringIO()
+def _captured_output() -> Iterator[io.StringIO]:
+    output = io.StringIO()
     with (
-        contextlib.redirect_stdout(noise),
-        contextlib.redirect_stderr(noise),
+        contextlib.redirect_stdout(output),
+        contextlib.redirect_stderr(output),
         warnings.catch_warnings(),
         np.errstate(all="ignore"),
     ):
         warnings.simplefilter("ignore")
-        yield noise
-    if noise.getvalue():
-        logger.debug("%s", noise.getvalue())
+        yield output
+    if output.getvalue():
+        logger.debug("%s", output.getvalue())
