@@ -1,4 +1,4 @@
-"""Calls in a process of their own, for libraries that can end the process."""
+"""Calls in a separate process, for libraries that can crash the process."""
 
 from __future__ import annotations
 
@@ -16,17 +16,17 @@ _Result = TypeVar("_Result")
 
 
 def isolated(work: Callable[_Arguments, _Result]) -> Callable[_Arguments, _Result]:
-    """Return a function that does the same in a new process.
+    """Return a function that runs ``work`` in a new process.
 
     Parameters
     ----------
     work
-        A function of a module; its arguments and its result are pickled.
+        A module-level function; its arguments and its result are pickled.
 
     Notes
     -----
-    What the process prints, from C as well, is thrown away. An exception comes back as it is; if the process ends
-    without a result the function raises :class:`AnisomeshError`.
+    The output of the process, including output of C code, is discarded. The function raises the exceptions of ``work``,
+    and :class:`AnisomeshError` if the process ends without a result.
     """
 
     def call(*args: _Arguments.args, **kwargs: _Arguments.kwargs) -> _Result:

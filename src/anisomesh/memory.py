@@ -1,4 +1,4 @@
-"""Whether a run fits into the memory of this machine."""
+"""Check that a run fits into the memory of this machine."""
 
 from __future__ import annotations
 
@@ -6,27 +6,28 @@ import os
 
 from anisomesh.errors import OptionError
 
-BYTES_PER_VERTEX, BYTES_PER_FACE = 6_000, 1_500  # of memory; measured with benchmarks/speed.py
+_BYTES_PER_VERTEX = 6_000  # peak memory per vertex of the result; measured with benchmarks/speed.py
+_BYTES_PER_FACE = 1_500  # peak memory per face of the working surface; measured with benchmarks/speed.py
 
 
-def check_memory(n: int, n_faces: int) -> None:
-    """Refuse what cannot fit into the memory of this machine, before hours are spent on it.
+def check_memory(n_vertices: int, n_faces: int) -> None:
+    """Check that a remesh fits into the physical memory of this machine.
 
     Parameters
     ----------
-    n, n_faces
-        Vertices asked for, and faces of the surface that is embedded.
+    n_vertices, n_faces
+        Vertices of the result, and faces of the working surface that is embedded.
 
     Raises
     ------
     OptionError
-        If they do not fit.
+        If the estimated memory exceeds the physical memory.
     """
     try:
-        there = os.sysconf("SC_PAGE_SIZE") * os.sysconf("SC_PHYS_PAGES")
-    except (AttributeError, ValueError, OSError):  # not a system that tells
+        physical = os.sysconf("SC_PAGE_SIZE") * os.sysconf("SC_PHYS_PAGES")
+    except (AttributeError, ValueError, OSError):  # unknown on this system
         return
-    needed = BYTES_PER_VERTEX * n + BYTES_PER_FACE * n_faces
-    if needed > there:
-        sizes = f"about {needed / 2**30:,.0f} GiB of memory, and this machine has {there / 2**30:,.0f}"
-        raise OptionError(f"{n:,} vertices need {sizes}; ask for fewer")
+    needed = _BYTES_PER_VERTEX * n_vertices + _BYTES_PER_FACE * n_faces
+    if needed > physical:
+        sizes = f"about {needed / 2**30:,.0f} GiB of memory, and this machine has {physical / 2**30:,.0f}"
+        raise OptionError(f"{n_vertices:,} vertices need {sizes}; ask for fewer")

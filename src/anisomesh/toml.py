@@ -1,4 +1,4 @@
-"""TOML files read strictly: a key that is not known is an error that names the one that was meant."""
+"""Strict reading of TOML files: an unknown key is an error with a suggestion."""
 
 from __future__ import annotations
 
@@ -12,12 +12,19 @@ from anisomesh.errors import OptionError
 
 
 def parse_toml(name: str, text: str) -> dict[str, Any]:
-    """Return the table in a text.
+    """Return the table in a TOML text.
+
+    Parameters
+    ----------
+    name
+        Name of the text in messages.
+    text
+        The text.
 
     Raises
     ------
     OptionError
-        If it is no TOML.
+        If the text is not TOML.
     """
     try:
         return tomllib.loads(text)
@@ -26,12 +33,12 @@ def parse_toml(name: str, text: str) -> dict[str, Any]:
 
 
 def read_toml(path: Path) -> dict[str, Any]:
-    """Return the table in a file.
+    """Return the table in a TOML file.
 
     Raises
     ------
     OptionError
-        If it cannot be read or is no TOML.
+        If the file cannot be read or is not TOML.
     """
     try:
         text = path.read_text(encoding="utf-8")
@@ -41,7 +48,7 @@ def read_toml(path: Path) -> dict[str, Any]:
 
 
 def check_keys(where: str, table: dict[str, Any], known: Iterable[str]) -> None:
-    """Raise OptionError for the first key of a table that is not known."""
+    """Raise OptionError for the first unknown key of a table, at the place ``where`` of a file."""
     names = sorted(known)
     for key in table:
         if key not in names:
@@ -49,6 +56,6 @@ def check_keys(where: str, table: dict[str, Any], known: Iterable[str]) -> None:
 
 
 def hint(word: str, known: Iterable[str]) -> str:
-    """Return a question that names the known word most like this one, nothing if none is."""
+    """Return a suggestion of the most similar known word, empty if none is similar."""
     close = difflib.get_close_matches(word, list(known), 1)
     return f" (did you mean {close[0]!r}?)" if close else ""

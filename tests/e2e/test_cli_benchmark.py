@@ -114,7 +114,7 @@ def test_methods_are_given_worse_meshes_and_compared_with_the_clean_one(tmp_path
 
     def unchanged(surface, n, seed, options):
         given[len(given)] = surface
-        return methods.Produced(surface, {})
+        return methods.MethodResult(surface, {})
 
     monkeypatch.setitem(methods.METHODS, "acvd", methods.Remesher(unchanged))
     inputs = ["clean", "noise 0.1", "noise 0.3", "stretched"]
@@ -131,11 +131,15 @@ def test_methods_are_given_worse_meshes_and_compared_with_the_clean_one(tmp_path
     again = run_suite(three, tmp_path / "others")
     assert [row["evaluation"] for row in again] == [row["evaluation"] for row in rows]
     assert "50% of noise 0.3" in markdown(three, rows)
-    older = {key: value for key, value in rows[0].items() if key != "input"}
+    older = json.loads(json.dumps({key: value for key, value in rows[0].items() if key != "input"}))
+    older["evaluation"]["validity"]["flipped"] = older["evaluation"]["validity"].pop("inverted")
     (tmp_path / "older").write_text(json.dumps(older) + "\n")
     steps = []
-    run_suite(suite(shapes=["sphere:640"], methods=three_methods(three)), tmp_path / "older", on_row=steps.append)
+    read = run_suite(
+        suite(shapes=["sphere:640"], methods=three_methods(three)), tmp_path / "older", on_row=steps.append
+    )
     assert not steps
+    assert read[0]["evaluation"]["validity"] == rows[0]["evaluation"]["validity"]
 
 
 def three_methods(some):
@@ -179,7 +183,7 @@ def test_the_boundary_of_open_meshes_is_in_the_tables(tmp_path):
     both = suite(meshes=["*.ply"], ratios=[0.5])
     rows = run_suite(both, tmp_path / "rows", data=tmp_path)
     heading, lines = run_table(rows)
-    shown = {line[0]: line[heading.index("boundary, max")] for line in lines}
+    shown = {line[0]: line[heading.index("boundary max [edges]")] for line in lines}
     closed = next(name for name in shown if name != "open.ply")
     assert 0.0 <= float(shown["open.ply"]) < 0.5
     assert shown[closed] == "-"
@@ -188,7 +192,7 @@ def test_the_boundary_of_open_meshes_is_in_the_tables(tmp_path):
 def test_a_foreign_file_of_rows_is_not_touched(tmp_path):
     path = tmp_path / "rows"
     path.write_text("not a row\n")
-    with pytest.raises(AnisomeshError, match="line 1: this is no row"):
+    with pytest.raises(AnisomeshError, match="line 1: not a row"):
         run_suite(suite(), path)
     assert path.read_text() == "not a row\n"
 
@@ -218,10 +222,12 @@ def test_list_and_errors(run_cli, tmp_path):
 
 def test_a_suite_trains_the_networks_that_it_compares(tmp_path, run_cli):
     pytest.importorskip("torch")
-    from anisomesh.learn.data.build import build, sources_of
+    from anisomesh.learn.data.build import build
     from anisomesh.learn.data.recipe import Recipe
+    from anisomesh.learn.data.sources import sources_of
+    from anisomesh.pipeline import remesh
 
-    build(sources_of(None, 6), tmp_path / "items", Recipe(target=200, variants=()), validation=0.4)
+    build(sources_of(None, 6, validation=0.4), tmp_path / "items", Recipe(target=200, variants=()), remesh)
     training = {"epochs": 2, "network": {"channels": 8, "scales": 2, "blocks": 1, "heads": 1}}
     paper = {"epochs": 1, "paper": {"channels": 8, "levels": 2}}
     neural = {"method": "anisomesh", "options": {"embedding": "neural", "max_iterations": 3}}

@@ -5,7 +5,7 @@ import pytest
 from anisomesh.bench.inputs import inputs_of, make_shape
 from anisomesh.bench.suite import load_suite, parse_suite, suite_names
 from anisomesh.errors import OptionError
-from anisomesh.learn.inference.pretrained import shipped_weights
+from anisomesh.learn.inference.pretrained import pretrained_networks
 from anisomesh.options import RemeshOptions
 
 LEARNING = ("ablation-loss", "ablation-laplacian")
@@ -38,7 +38,7 @@ def test_networks_that_shipped_suites_name_come_with_the_package():
         if "weights" in method.options
     }
     assert named
-    assert named <= set(shipped_weights())
+    assert named <= set(pretrained_networks())
 
 
 @pytest.mark.parametrize("name", LEARNING)

@@ -1,1 +1,1 @@
-"""Suites of remeshes that are run, measured, resumed and put into tables."""
+"""Benchmark suites: methods on meshes, run, resumed, measured and put into tables, see :class:`.suite.Suite`."""

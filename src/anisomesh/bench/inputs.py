@@ -1,4 +1,4 @@
-"""The meshes of a suite: files of the data folder, and shapes made by code."""
+"""The meshes of a suite: files of the data folder and procedural shapes."""
 
 from __future__ import annotations
 
@@ -15,29 +15,33 @@ from anisomesh.mesh.surface import Surface
 from anisomesh.shapes.analytic import sphere, torus, twisted_ring
 from anisomesh.shapes.cad_part import cad_part
 
+_RING_POINTS = 5_440  # of the twisted ring with 160 sections of 34 points
+_PART_POINTS = 8_396  # of the machine part at resolution 24
+_TORUS_POINTS = 6_000  # heuristic: about as many as the meshes of the paper
+
 
 @dataclass(frozen=True)
 class Input:
-    """A mesh by name, loaded or made when it is its turn."""
+    """A mesh by name, loaded or generated on demand."""
 
     name: str
     make: Callable[[], Surface]
 
 
 def inputs_of(suite: Suite, data: Path | None) -> list[Input]:
-    """Return the meshes of a suite, in the order of their names.
+    """Return the meshes of a suite: files in the order of their names, then shapes.
 
     Parameters
     ----------
     suite
         The suite.
     data
-        The folder that its patterns refer to.
+        The folder of the mesh files; None if the suite has shapes only.
 
     Raises
     ------
     OptionError
-        If a pattern is there and no data folder, or a pattern matches no file.
+        If the suite has patterns but there is no data folder, or a pattern matches no file.
     """
     found = []
     for pattern in suite.meshes:
@@ -54,13 +58,13 @@ def inputs_of(suite: Suite, data: Path | None) -> list[Input]:
 
 
 def make_shape(spec: str) -> Surface:
-    """Return a shape made by code.
+    """Return a procedural shape.
 
     Parameters
     ----------
     spec
-        ``sphere:N``, ``ring:N`` or ``part:N`` with about N points, or ``torus:R`` whose triangles on the outer equator
-        are stretched R times, as in the paper's synthetic test.
+        ``sphere:N``, ``ring:N`` or ``part:N`` with about N points, or ``torus:R`` whose curvature metric stretches
+        triangles R times on the outer equator, as in the paper's synthetic test.
 
     Raises
     ------
@@ -71,7 +75,7 @@ def make_shape(spec: str) -> Surface:
     makers: dict[str, Callable[[float], Surface]] = {
         "sphere": lambda n: sphere(max(0, round(np.log(n / 10.0) / np.log(4.0)))),
         "ring": _ring,
-        "part": lambda n: cad_part(max(2, round(24 * np.sqrt(n / 8_396)))),
+        "part": lambda n: cad_part(max(2, round(24 * np.sqrt(n / _PART_POINTS)))),
         "torus": _stretched_torus,
     }
     try:
@@ -84,15 +88,15 @@ def make_shape(spec: str) -> Surface:
 
 
 def _ring(n: float) -> Surface:
-    finer = np.sqrt(n / 5440)
+    finer = np.sqrt(n / _RING_POINTS)
     return twisted_ring(n_major=round(160 * finer), n_section=(round(12 * finer), round(5 * finer)))
 
 
 def _stretched_torus(ratio: float) -> Surface:
-    """Return a torus with (major + minor) / minor = ratio^2, its faces about square, about 6,000 points."""
+    """Return a torus with (major + minor) / minor = ratio^2 and about square faces."""
     minor = 1.0 / (ratio**2 - 1.0)
-    n_minor = max(12, round(np.sqrt(6_000 * minor)))
-    return torus(1.0, minor, max(24, round(6_000 / n_minor)), n_minor)
+    n_minor = max(12, round(np.sqrt(_TORUS_POINTS * minor)))
+    return torus(1.0, minor, max(24, round(_TORUS_POINTS / n_minor)), n_minor)
 
 
 def _loader(path: Path) -> Callable[[], Surface]:

@@ -1,4 +1,4 @@
-"""Running a suite: one row a run in a JSON-lines file, which a later call goes on with."""
+"""Running a suite: one row per run in a JSON-lines file, from which a later call resumes."""
 
 from __future__ import annotations
 
@@ -14,9 +14,9 @@ import numpy as np
 
 from anisomesh.bench.disturb import CLEAN, disturbed
 from anisomesh.bench.inputs import Input, inputs_of
-from anisomesh.bench.methods import METHODS, Produced
+from anisomesh.bench.methods import METHODS, MethodResult
 from anisomesh.bench.suite import Method, Suite
-from anisomesh.bench.training import trained
+from anisomesh.bench.training import train_networks
 from anisomesh.errors import AnisomeshError
 from anisomesh.evaluation.report import evaluate
 from anisomesh.io.atomic import append_line, drop_cut_line
@@ -25,12 +25,13 @@ from anisomesh.mesh.surface import Surface
 from anisomesh.repair.prepare import prepare
 
 RunRow = dict[str, Any]
-KEYS = ("mesh", "input", "ratio", "method", "seed")
+ROW_KEY = ("mesh", "input", "ratio", "method", "seed")
+_MIN_VERTICES = 4  # of a closed surface
 
 
 @dataclass(frozen=True)
 class SuiteProgress:
-    """What has just been done: its row, which of how many it was, and the seconds left if the rest is alike."""
+    """A finished run: its row, its number among all runs, and the estimated seconds left."""
 
     row: RunRow
     number: int
@@ -47,19 +48,19 @@ def run_suite(
     on_row: Callable[[SuiteProgress], None] = lambda progress: None,
     on_epoch: Callable[[str], None] = lambda text: None,
 ) -> list[RunRow]:
-    """Run what is not yet in a file of rows and return all rows of the suite.
+    """Run all runs of a suite that a file of rows lacks, and return all rows.
 
     Parameters
     ----------
     suite
-        What to run.
+        The suite.
     out
-        The file of rows, one JSON object a line; it is made if it is not there. A row is written in full as soon as its
-        run has ended, so a call that was killed loses no more than one run.
+        The file of rows, one JSON object per line; created if missing. A row is written in full at the end of its run,
+        so a killed call loses at most one run.
     data
-        The folder that the mesh patterns of the suite refer to.
+        Folder of the mesh files of the suite.
     items
-        The data set that networks are trained on, if the suite has some. They are written beside the rows.
+        Data set for suites that train networks. The networks are written beside the rows.
     on_row
         Called after every run.
     on_epoch
@@ -68,10 +69,10 @@ def run_suite(
     Returns
     -------
     rows
-        With the keys ``mesh, input, ratio, method, seed``; ``options`` of the method; ``status``, one of ``done``,
-        ``failed`` with ``error``, and ``absent`` where a package of the method is missing; ``asked`` vertices, wall
-        ``seconds``, the ``facts`` of the method and the ``evaluation``. Failed runs are not tried again, absent ones
-        are.
+        With the keys ``mesh, input, ratio, method, seed``; ``options`` of the method; ``status`` (``done``,
+        ``skipped``, ``failed`` with ``error``, or ``absent`` if a package of the method is missing); the requested
+        number of vertices ``asked``, wall-clock ``seconds``, the ``facts`` of the method and the ``evaluation``. Only
+        absent runs and runs with other options are repeated.
 
     Raises
     ------
@@ -82,7 +83,7 @@ def run_suite(
     drop_cut_line(out)
     known = {_key(row): row for row in read_rows(out)}
     jobs = [job for job in _jobs(suite, inputs) if not _is_done(known.get(job.key), job)]
-    weights = trained(suite, out.with_suffix(""), items, on_epoch) if jobs else {}
+    weights = train_networks(suite, out.with_suffix(""), items, on_epoch) if jobs else {}
     start = time.monotonic()
     loaded: _Loaded | None = None
     for number, job in enumerate(jobs, 1):
@@ -101,41 +102,48 @@ def run_suite(
 
 
 def read_rows(path: Path) -> list[RunRow]:
-    """Return the rows of a file, none if it is not there.
+    """Return the rows of a file, none if it does not exist.
+
+    Rows of earlier versions are read too: without an input they are of the clean mesh, and their ``flipped`` triangles
+    are the ``inverted`` ones.
 
     Raises
     ------
     AnisomeshError
-        If a line is no row.
+        If a line is not a row.
     """
     rows = []
     for number, line in enumerate(path.read_text(encoding="utf-8").splitlines() if path.exists() else [], 1):
         try:
             row = json.loads(line)
+            row.setdefault("input", CLEAN)
             _key(row)
         except (json.JSONDecodeError, KeyError, TypeError) as error:
-            raise AnisomeshError(f"{path}, line {number}: this is no row of a benchmark; move the file away") from error
+            raise AnisomeshError(f"{path}, line {number}: not a row of a benchmark; move the file away") from error
+        validity = row.get("evaluation", {}).get("validity", {})
+        if "flipped" in validity:
+            validity["inverted"] = validity.pop("flipped")
         rows.append(row)
     return rows
 
 
-def chosen(rows: Sequence[RunRow], given: str, ratio: float, method: str) -> list[RunRow]:
+def select_rows(rows: Sequence[RunRow], input_name: str, ratio: float, method: str) -> list[RunRow]:
     """Return the rows of a method for an input at a ratio."""
-    return [row for row in rows if (row.get("input", CLEAN), row["ratio"], row["method"]) == (given, ratio, method)]
+    return [row for row in rows if (row["input"], row["ratio"], row["method"]) == (input_name, ratio, method)]
 
 
 @dataclass(frozen=True)
 class _Job:
     mesh: Input
-    given: str
+    input_name: str
     ratio: float
     method: Method
     seed: int
 
     @property
     def start(self) -> RunRow:
-        """The part of the row that is known beforehand."""
-        names = {"mesh": self.mesh.name, "input": self.given, "ratio": self.ratio, "method": self.method.name}
+        """The part of the row that is known before the run."""
+        names = {"mesh": self.mesh.name, "input": self.input_name, "ratio": self.ratio, "method": self.method.name}
         training = {} if self.method.training is None else {"training": self.method.training}
         options = {"method": self.method.method, **self.method.options, **training}
         return {**names, "seed": self.seed, "options": options}
@@ -147,30 +155,32 @@ class _Job:
 
 @dataclass(frozen=True)
 class _Loaded:
-    """A mesh and what is made of it for the methods."""
+    """A clean mesh and the input of the methods that is made from it."""
 
     name: str
     clean: Surface
-    given: str
+    input_name: str
     input: Surface
 
 
-def _loaded(job: _Job, before: _Loaded | None) -> _Loaded:
-    """Return the mesh of a job and its input, those from before where they are the same."""
-    same = before is not None and before.name == job.mesh.name
-    if before is not None and same and before.given == job.given:
-        return before
-    clean = before.clean if before is not None and same else prepare(job.mesh.make()).surface
-    return _Loaded(job.mesh.name, clean, job.given, disturbed(clean, job.given, job.mesh.name))
+def _loaded(job: _Job, previous: _Loaded | None) -> _Loaded:
+    """Return the mesh and the input of a job, reusing the previous ones if they are equal."""
+    same_mesh = previous is not None and previous.name == job.mesh.name
+    if previous is not None and same_mesh and previous.input_name == job.input_name:
+        return previous
+    clean = previous.clean if previous is not None and same_mesh else prepare(job.mesh.make()).surface
+    return _Loaded(job.mesh.name, clean, job.input_name, disturbed(clean, job.input_name, job.mesh.name))
 
 
 def _jobs(suite: Suite, meshes: list[Input]) -> Iterator[_Job]:
-    for mesh, given, ratio, method, seed in product(meshes, suite.inputs, suite.ratios, suite.methods, suite.seeds):
-        yield _Job(mesh, given, ratio, method, seed)
+    for mesh, input_name, ratio, method, seed in product(
+        meshes, suite.inputs, suite.ratios, suite.methods, suite.seeds
+    ):
+        yield _Job(mesh, input_name, ratio, method, seed)
 
 
 def _key(row: RunRow) -> tuple[Any, ...]:
-    return tuple(row.get(key, CLEAN) if key == "input" else row[key] for key in KEYS)  # older rows have no input
+    return tuple(row[key] for key in ROW_KEY)
 
 
 def _is_done(row: RunRow | None, job: _Job) -> bool:
@@ -183,22 +193,22 @@ def _run(job: _Job, loaded: _Loaded, suite: Suite, weights: Path | None) -> RunR
         return {**job.start, "status": "skipped", "error": "the mesh is open"}
     if remesher.missing:
         return {**job.start, "status": "absent", "error": f"{', '.join(remesher.missing)} not installed"}
-    n = max(4, round(job.ratio * loaded.clean.n_points))
+    n = max(_MIN_VERTICES, round(job.ratio * loaded.clean.n_points))
     start = time.perf_counter()
     try:
         run = isolated(remesher.run) if remesher.isolated else remesher.run
         options = job.method.options if weights is None else {**job.method.options, "weights": str(weights)}
-        produced: Produced = run(loaded.input, n, job.seed, options)
+        result: MethodResult = run(loaded.input, n, job.seed, options)
         seconds = time.perf_counter() - start
-        evaluation = evaluate(loaded.clean, produced.surface, samples=suite.samples).as_dict()
-    except Exception as error:  # whatever a library does wrong is its result here
+        evaluation = evaluate(loaded.clean, result.surface, samples=suite.samples).as_dict()
+    except Exception as error:  # a failure of a library is a result of the benchmark
         return {**job.start, "status": "failed", "error": f"{type(error).__name__}: {error}", "asked": n}
     return {
         **job.start,
         "status": "done",
         "asked": n,
         "seconds": seconds,
-        "facts": produced.facts,
+        "facts": result.facts,
         "evaluation": evaluation,
     }
 

@@ -1,4 +1,4 @@
-"""What a suite of runs is: a TOML file that names meshes, ratios, methods and seeds."""
+"""Suites as TOML files, read strictly."""
 
 from __future__ import annotations
 
@@ -12,24 +12,24 @@ from anisomesh.bench.methods import METHODS
 from anisomesh.errors import OptionError
 from anisomesh.toml import check_keys, hint, parse_toml
 
-_KEYS = {"description", "meshes", "shapes", "closed", "inputs", "ratios", "seeds", "samples", "methods"}
+_SUITE_KEYS = {"description", "meshes", "shapes", "closed", "inputs", "ratios", "seeds", "samples", "methods"}
 _METHOD_KEYS = {"name", "method", "options", "training"}
 
 
 @dataclass(frozen=True, kw_only=True)
 class Method:
-    """A way to remesh.
+    """A remesher with its options, a ``[[methods]]`` table of a suite.
 
     Attributes
     ----------
     name
-        Of its row.
+        Name in rows and tables, unique in the suite.
     method
-        Which method, by its name in :data:`anisomesh.bench.methods.METHODS`.
+        Key of :data:`anisomesh.bench.methods.METHODS`.
     options
-        What it takes.
+        Keyword arguments of the remesher.
     training
-        How the network is trained whose weights the method uses, in the form of :mod:`anisomesh.learn.training.config`.
+        Training of the network that the method uses, with the keys of :mod:`anisomesh.learn.training.config`.
     """
 
     name: str
@@ -40,28 +40,30 @@ class Method:
 
 @dataclass(frozen=True, kw_only=True)
 class Suite:
-    """Runs of every method on every mesh, as it is or made worse, at every ratio with every seed.
+    """A benchmark: every method on every mesh and input, at every ratio, with every seed; one row per run.
+
+    A suite is a TOML file with these keys; suites of the package are in ``anisomesh/bench/suites``.
 
     Attributes
     ----------
     name, description
-        What the suite is called and what it shows.
+        Name (of the file) and purpose.
     meshes
-        Patterns of mesh files, relative to the data folder.
+        Patterns of mesh files in the data folder, such as ``"test/*.ply"``.
     shapes
-        Meshes made by code, ``name:size``, see :func:`anisomesh.bench.inputs.make_shape`.
+        Procedural shapes, ``"name:size"``, see :func:`anisomesh.bench.inputs.make_shape`.
     closed
-        Whether meshes with a boundary are left out.
+        Skip meshes with a boundary.
     inputs
-        What the methods are given: ``"clean"``, the mesh as it is; ``"noise SIZE"``, with noise of this deviation in
-        mean edge lengths on every coordinate; ``"stretched"``, with other triangles, stretched in a random direction.
-        Results are always compared with the clean mesh.
+        Inputs of the methods: ``"clean"``, the repaired mesh; ``"noise SIZE"``, with normal noise of this standard
+        deviation (in mean edge lengths) on every coordinate; ``"stretched"``, with triangles stretched in a random
+        direction. Results are always compared with the clean mesh.
     ratios
-        Vertices of the results per vertex of the prepared input.
+        Vertices of the result per vertex of the clean mesh.
     seeds
-        Seeds of the methods that have one.
+        Seeds, for methods that use one.
     samples
-        Points on each surface that the results are measured with.
+        Random points on each surface for the measures of a result.
     methods
         The methods.
     """
@@ -85,18 +87,18 @@ class Suite:
 
 
 def suite_names() -> list[str]:
-    """Return the names of the suites that come with the package."""
+    """Return the names of the suites of the package."""
     folder = resources.files("anisomesh.bench") / "suites"
     return sorted(entry.name.removesuffix(".toml") for entry in folder.iterdir() if entry.name.endswith(".toml"))
 
 
 def load_suite(name: str) -> Suite:
-    """Return a suite by the name of a shipped one or the path of a TOML file.
+    """Load a suite of the package by name, or a TOML file by path.
 
     Raises
     ------
     OptionError
-        If there is no such suite, or the file has an error; the message says where, and what was meant.
+        If there is no such suite, or the file has an error; the message names the place and the likely key.
     """
     if name in suite_names():
         text = (resources.files("anisomesh.bench") / "suites" / f"{name}.toml").read_text(encoding="utf-8")
@@ -111,31 +113,25 @@ def load_suite(name: str) -> Suite:
 
 
 def parse_suite(name: str, table: dict[str, Any]) -> Suite:
-    """Return the suite that a table of a TOML file describes, checked key by key.
+    """Return the suite in a TOML table after checking every key.
 
     Raises
     ------
     OptionError
         If a key or method is unknown, missing, or has a value of the wrong kind.
     """
-    check_keys(name, table, _KEYS)
+    check_keys(name, table, _SUITE_KEYS)
     methods = tuple(_method(name, entry) for entry in _list(name, table, "methods", dict))
     if not methods:
         raise OptionError(f"{name}: there is no method; add a [[methods]] table with name and method")
     if len({method.name for method in methods}) < len(methods):
         raise OptionError(f"{name}: two methods have the same name; give each its own")
-    suite = Suite(
-        name=name,
-        description=str(table.get("description", "")),
-        meshes=tuple(_list(name, table, "meshes", str)),
-        shapes=tuple(_list(name, table, "shapes", str)),
-        closed=bool(table.get("closed", False)),
-        inputs=tuple(_list(name, table, "inputs", str)) or (CLEAN,),
-        ratios=tuple(float(ratio) for ratio in _list(name, table, "ratios", int | float)) or (1.0,),
-        seeds=tuple(_list(name, table, "seeds", int)) or (0,),
-        samples=int(table.get("samples", 100_000)),
-        methods=methods,
-    )
+    kinds = {"meshes": str, "shapes": str, "inputs": str, "ratios": int | float, "seeds": int}
+    lists = {key: tuple(_list(name, table, key, kind)) for key, kind in kinds.items()}
+    lists["ratios"] = tuple(map(float, lists["ratios"]))
+    values: dict[str, Any] = {key: entries for key, entries in lists.items() if entries}  # empty ones keep the default
+    values |= {key: table[key] for key in ("closed", "samples") if key in table}
+    suite = Suite(name=name, description=str(table.get("description", "")), methods=methods, **values)
     if not suite.meshes and not suite.shapes:
         raise OptionError(f"{name}: there is no mesh; name files in meshes = [...] or shapes in shapes = [...]")
     return suite

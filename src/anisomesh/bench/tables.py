@@ -1,4 +1,4 @@
-"""Tables of the rows of a suite, in Markdown and HTML."""
+"""Reports of a suite: tables of its rows, in Markdown and HTML."""
 
 from __future__ import annotations
 
@@ -11,13 +11,13 @@ from typing import Any
 import numpy as np
 
 from anisomesh.bench.disturb import CLEAN
-from anisomesh.bench.runs import RunRow, chosen
+from anisomesh.bench.runs import RunRow, select_rows
 from anisomesh.bench.suite import Suite
 
 
 @dataclass(frozen=True)
 class Column:
-    """A figure of a row: its heading, how to find it, how many digits to show, and how to average it."""
+    """A figure of a row: heading with unit, value, digits to show, and whether means are geometric."""
 
     heading: str
     value: Callable[[RunRow], float | None]
@@ -48,28 +48,34 @@ def _boundary(which: str) -> Callable[[RunRow], float | None]:
 
 
 COLUMNS = (
-    Column("V", _figure("vertices"), 0),
-    Column("CD x1e-5", _figure("sampled", "chamfer", factor=1e5), 3),
-    Column("(floor)", _figure("floor", "chamfer", factor=1e5), 3),
+    Column("vertices", _figure("vertices"), 0),
+    Column("CD [1e-5 D²]", _figure("sampled", "chamfer", factor=1e5), 3),
+    Column("CD floor [1e-5 D²]", _figure("floor", "chamfer", factor=1e5), 3),
     Column("F1", _figure("sampled", "f1"), 3),
-    Column("(floor)", _figure("floor", "f1"), 3),
+    Column("F1 floor", _figure("floor", "f1"), 3),
     Column("NC", _figure("sampled", "normal_consistency"), 3),
-    Column("HD x1e-2", _figure("sampled", "hausdorff", factor=1e2), 3),
-    Column("ECD x1e-2", _figure("sampled", "edge_chamfer", factor=1e2), 3),
+    Column("HD [1e-2 D]", _figure("sampled", "hausdorff", factor=1e2), 3),
+    Column("ECD [1e-2 D²]", _figure("sampled", "edge_chamfer", factor=1e2), 3),
     Column("EF1", _figure("sampled", "edge_f1"), 3),
-    Column("RMS x1e-4", _figure("distance", "rms", factor=1e4), 3, geometric=True),
-    Column("max x1e-3", _figure("distance", "hausdorff", factor=1e3), 2, geometric=True),
+    Column("RMS [1e-4 D]", _figure("distance", "rms", factor=1e4), 3, geometric=True),
+    Column("max [1e-3 D]", _figure("distance", "hausdorff", factor=1e3), 2, geometric=True),
     Column("G", _figure("shape", "g_mean"), 3),
     Column("G 5 %", _figure("shape", "g_low"), 3),
-    Column("creases", _figure("features", "crease_covered"), 3),
-    Column("boundary, mean", _boundary("mean"), 3),
-    Column("boundary, max", _boundary("max"), 3),
-    Column("seconds", lambda row: float(row["seconds"]), 2),
+    Column("creases covered", _figure("features", "crease_covered"), 3),
+    Column("boundary mean [edges]", _boundary("mean"), 3),
+    Column("boundary max [edges]", _boundary("max"), 3),
+    Column("time [s]", lambda row: float(row["seconds"]), 2),
+)
+_LEGEND = (
+    "ratio: vertices of the result per vertex of the mesh. D: bounding-box diagonal of the mesh. CD, F1, NC, HD, ECD, "
+    "EF1: the measures of the paper between samples; floor: the same between two samples of the mesh itself. RMS, max: "
+    "distance between the surfaces. G: quality of the triangles in the metric, 5 %: quantile. boundary: distance "
+    "between the boundaries, in mean edge lengths of the result."
 )
 
 
 def faults(row: RunRow) -> list[str]:
-    """Return what is not valid about the result of a row, in words."""
+    """Return the faults of the result of a row in words."""
     validity = row["evaluation"]["validity"]
     found = [name for name in ("nonmanifold_edges", "nonmanifold_vertices", "flat", "inverted") if validity.get(name)]
     if not validity["oriented"]:
@@ -84,34 +90,33 @@ def faults(row: RunRow) -> list[str]:
 def mean_table(suite: Suite, rows: Sequence[RunRow]) -> tuple[list[str], list[list[str]]]:
     """Return heading and lines of the means over meshes and seeds, by input, ratio and method.
 
-    Distances are averaged geometrically, everything else arithmetically; figures that are not defined for a mesh (ECD
-    without creases) are left out of the mean. Runs that failed, and results that are not valid, are counted.
+    Means of RMS and max are geometric, all others arithmetic. Undefined figures (ECD without creases) are left out.
     """
-    heading = ["vertices", "method", "runs", *(column.heading for column in COLUMNS), "failed", "not valid"]
+    heading = ["ratio", "method", "runs", *(column.heading for column in COLUMNS), "failed", "invalid"]
     lines = []
-    for given, ratio, method in product(suite.inputs, suite.ratios, suite.methods):
-        group = chosen(rows, given, ratio, method.name)
+    for input_name, ratio, method in product(suite.inputs, suite.ratios, suite.methods):
+        group = select_rows(rows, input_name, ratio, method.name)
         done = [row for row in group if row["status"] == "done"]
         if not any(row["status"] in ("done", "failed") for row in group):
             continue
         figures = [_mean(column, done) for column in COLUMNS]
         failed = sum(row["status"] == "failed" for row in group)
         invalid = sum(bool(faults(row)) for row in done)
-        lines.append([_vertices(given, ratio), method.name, str(len(done)), *figures, str(failed), str(invalid)])
+        lines.append([_ratio(input_name, ratio), method.name, str(len(done)), *figures, str(failed), str(invalid)])
     return heading, lines
 
 
-def _vertices(given: str, ratio: float) -> str:
-    """Return the ratio of a row, and its input where that is not the clean mesh."""
-    return f"{ratio:.0%}" if given == CLEAN else f"{ratio:.0%} of {given}"
+def _ratio(input_name: str, ratio: float) -> str:
+    """Return the ratio of a row, with the input unless it is the clean mesh."""
+    return f"{ratio:.0%}" if input_name == CLEAN else f"{ratio:.0%} of {input_name}"
 
 
 def run_table(rows: Sequence[RunRow]) -> tuple[list[str], list[list[str]]]:
     """Return heading and lines of the single runs."""
-    heading = ["mesh", "vertices", "method", "seed", *(column.heading for column in COLUMNS), "remarks"]
+    heading = ["mesh", "ratio", "method", "seed", *(column.heading for column in COLUMNS), "remarks"]
     lines = []
     for row in rows:
-        names = [row["mesh"], _vertices(row.get("input", CLEAN), row["ratio"]), row["method"], str(row["seed"])]
+        names = [row["mesh"], _ratio(row["input"], row["ratio"]), row["method"], str(row["seed"])]
         if row["status"] == "done":
             figures, remark = [_shown(column.value(row), column.digits) for column in COLUMNS], ", ".join(faults(row))
         else:
@@ -121,10 +126,10 @@ def run_table(rows: Sequence[RunRow]) -> tuple[list[str], list[list[str]]]:
 
 
 def time_table(rows: Sequence[RunRow]) -> tuple[list[str], list[list[str]]]:
-    """Return heading and lines of the seconds of each stage against the number of vertices wanted.
+    """Return heading and lines of the time per stage, for methods that report it.
 
-    For methods that tell the seconds of their stages; below them the exponent of a power law fitted to the runs, where
-    there are at least three sizes. Without such methods there are no lines.
+    With at least three numbers of vertices, the last line of a method has the exponents of power laws fitted to the
+    times.
     """
     done = [row for row in rows if row["status"] == "done" and "seconds" in row["facts"]]
     stages = list(dict.fromkeys(stage for row in done for stage in row["facts"]["seconds"] if stage != "load"))
@@ -139,17 +144,17 @@ def time_table(rows: Sequence[RunRow]) -> tuple[list[str], list[list[str]]]:
         if len(np.unique(sizes)) >= 3:
             growth = np.polyfit(np.log(sizes), np.log(np.maximum(seconds, 1e-9)), 1)[0]
             lines.append([method, "exponent of n", "", "", *(f"{value:.2f}" for value in growth)])
-    return ["method", "mesh", "ratio", "vertices wanted", *stages], lines
+    return ["method", "mesh", "ratio", "vertices requested", *(f"{stage} [s]" for stage in stages)], lines
 
 
 def _sections(suite: Suite, rows: Sequence[RunRow]) -> list[tuple[str, tuple[list[str], list[list[str]]]]]:
-    sections = [("Means", mean_table(suite, rows)), ("Runs", run_table(rows)), ("Seconds", time_table(rows))]
+    sections = [("Means", mean_table(suite, rows)), ("Runs", run_table(rows)), ("Time per stage", time_table(rows))]
     return [section for section in sections if section[1][1]]
 
 
 def markdown(suite: Suite, rows: Sequence[RunRow], chart: str = "") -> str:
-    """Return the report of a suite as Markdown; ``chart`` is the name of a picture to show."""
-    parts = [f"# {suite.name}", suite.description.strip(), _remarks(rows)]
+    """Return the report of a suite as Markdown, with a chart by file name."""
+    parts = [f"# {suite.name}", suite.description.strip(), _remarks(rows), _LEGEND]
     parts.append(f"![Distance against quality]({chart})" if chart else "")
     for title, (heading, lines) in _sections(suite, rows):
         cells = [heading, ["---"] * len(heading), *lines]
@@ -159,9 +164,9 @@ def markdown(suite: Suite, rows: Sequence[RunRow], chart: str = "") -> str:
 
 
 def web_page(suite: Suite, rows: Sequence[RunRow], chart: str = "") -> str:
-    """Return the report of a suite as a page of HTML that needs nothing else; ``chart`` is SVG to show in it."""
+    """Return the report of a suite as a self-contained HTML page, with a chart as SVG text."""
     parts = [f"<h1>{html.escape(suite.name)}</h1>", f"<p>{html.escape(suite.description.strip())}</p>"]
-    parts.append(f"<p>{html.escape(_remarks(rows))}</p>")
+    parts += [f"<p>{html.escape(text)}</p>" for text in (_remarks(rows), _LEGEND) if text]
     parts.append(chart[chart.find("<svg") :] if chart else "")
     for title, (heading, lines) in _sections(suite, rows):
         head = "".join(f"<th>{html.escape(cell)}</th>" for cell in heading)
@@ -169,11 +174,11 @@ def web_page(suite: Suite, rows: Sequence[RunRow], chart: str = "") -> str:
         parts.append(f"<h2>{title}</h2>\n<table>\n<tr>{head}</tr>\n{body}\n</table>")
     return (
         f'<!doctype html>\n<html lang="en"><head><meta charset="utf-8"><title>{html.escape(suite.name)}</title>\n'
-        f"<style>{_STYLE}</style></head><body>\n" + "\n".join(parts) + "\n</body></html>\n"
+        f"<style>{_PAGE_CSS}</style></head><body>\n" + "\n".join(parts) + "\n</body></html>\n"
     )
 
 
-_STYLE = (
+_PAGE_CSS = (
     "body{font:15px/1.5 system-ui,sans-serif;margin:2em}table{border-collapse:collapse}"
     "th,td{padding:.2em .7em;border-bottom:1px solid #ddd;text-align:right;white-space:nowrap}"
     "th{position:sticky;top:0;background:#fff}td:nth-child(-n+3),th:nth-child(-n+3){text-align:left}"

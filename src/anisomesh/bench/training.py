@@ -1,4 +1,4 @@
-"""Networks that a suite compares: trained before the first run, each in a folder of its own."""
+"""Training of the networks that a suite compares, before its first run."""
 
 from __future__ import annotations
 
@@ -13,17 +13,17 @@ from anisomesh.errors import OptionError
 from anisomesh.learn import require_torch
 
 
-def trained(
+def train_networks(
     suite: Suite, out: Path, items: Path | None, on_epoch: Callable[[str], None] = lambda text: None
 ) -> dict[str, Path]:
-    """Return the weights of the networks of a suite by the names of its methods, trained where they are not there.
+    """Train the networks of a suite unless they are trained already; return their weights by method name.
 
     Parameters
     ----------
     suite
-        The suite; methods without a training have no weights.
+        The suite; only methods with a training have weights.
     out
-        Folder of the trainings; those that were stopped go on.
+        Folder with a folder for each training; stopped trainings are resumed.
     items
         Folder of the data set.
     on_epoch
@@ -32,9 +32,9 @@ def trained(
     Raises
     ------
     OptionError
-        If there is something to train and no data set, or a training has an unknown key.
+        If there is a network to train but no data set, or a training has an unknown key.
     LearningError, WeightsError, DivergedError, MeshFileError
-        If torch is missing, a checkpoint or the data set damaged, or a training ends in no number.
+        If torch is missing, a checkpoint or the data set is damaged, or a loss is not finite.
     """
     methods = [method for method in suite.methods if method.training is not None]
     if not methods:
@@ -49,7 +49,7 @@ def trained(
 
     files = files_of(items)
     runs: dict[str, TrainingOptions] = {}
-    for method in methods:  # all tables are read before the first network is trained
+    for method in methods:  # check all tables before the first training
         table = {"data": str(items), "out": "", **(method.training or {})}
         options = parse_training(f"{suite.name}: training of {method.name!r}", table)
         runs[method.name] = replace(options, out=str(out / _folder(method)))
@@ -66,6 +66,6 @@ def trained(
 
 
 def _folder(method: Method) -> str:
-    """Return a name for the folder of a training, another one when the training is changed."""
+    """Return a folder name that depends on all settings of the training."""
     mark = hashlib.sha256(json.dumps([method.name, method.training], sort_keys=True).encode()).hexdigest()[:8]
     return "".join(letter if letter.isalnum() else "-" for letter in method.name) + "-" + mark
