@@ -1,9 +1,9 @@
-"""Seconds and memory from a mesh to its embedding against its size, on one core: neural and direct.
+"""Time and memory from a mesh to its embedding over its size, on one core: neural and direct.
 
 Usage: python benchmarks/inference.py [--largest 1000000] [--data DIR] [--out benchmarks/out/inference.png]
 
-Rings made by code, and the meshes of DIR/test and DIR/zeroshot (ANISOMESH_DATA); the picture shows them as the paper's
-figure of timings does, coloured by their mean stretch.
+Inputs are procedural rings, and the meshes in DIR/test and DIR/zeroshot (ANISOMESH_DATA). The picture is like the
+timing figure of the paper, coloured by mean stretch.
 """
 
 from __future__ import annotations
@@ -28,21 +28,21 @@ from anisomesh.metric.tensors import compute_metric
 from anisomesh.repair.prepare import prepare
 
 SIZES = (1_000, 3_000, 10_000, 30_000, 100_000, 300_000, 1_000_000)
-STEPS = 10
-MOST = 200_000  # points of a mesh of the data folder
+EMBEDDING_ITERATIONS = 10
+MAX_POINTS = 200_000  # larger meshes of the data folder are skipped
 
 
 def measured(surface: Surface, kind: str) -> dict[str, Any]:
-    """Return the seconds of a metric and of its embedding, peak memory, and the mean stretch, in this process."""
+    """Return seconds of metric and embedding, peak memory of the metric (kB per point), and mean stretch."""
     unit = surface.with_points(unit_frame(surface.points).to_unit(surface.points))
-    small = make_shape("ring:1000")  # what is loaded and compiled once
+    small = make_shape("ring:1000")  # loads and compiles everything
     embed(small, predict(small).tensors if kind == "neural" else compute_metric(small))
     before = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss
     start = time.perf_counter()
     tensors = predict(unit, denoise=False).tensors if kind == "neural" else compute_metric(unit)
     middle = time.perf_counter()
     peak = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss
-    embedding = embed(unit, tensors, max_iterations=STEPS)
+    embedding = embed(unit, tensors, max_iterations=EMBEDDING_ITERATIONS)
     end = time.perf_counter()
     kilobytes = (peak - before) / surface.n_points
     seconds = {"metric": middle - start, "embedding": end - middle}
@@ -79,13 +79,13 @@ def main() -> None:
     asked = parser.parse_args()
     rows = []
     print(f"load {os.getloadavg()[0]:.2f}")
-    print("| mesh | points | from | metric, s | embedding, s | metric, kB a point |\n|---|---|---|---|---|---|")
+    print("| mesh | points | from | metric, s | embedding, s | metric, kB per point |\n|---|---|---|---|---|---|")
     meshes = [(f"ring:{n}", None) for n in SIZES if n <= asked.largest]
     if asked.data is not None:
         meshes += [(p.name, p) for folder in ("test", "zeroshot") for p in sorted(asked.data.glob(f"{folder}/*.ply"))]
     for name, path in meshes:
         surface = make_shape(name) if path is None else prepare(load(path)).surface
-        if path is not None and surface.n_points > MOST:
+        if path is not None and surface.n_points > MAX_POINTS:
             continue
         for kind in ("neural", "direct"):
             row = {"kind": kind, **isolated(measured)(surface, kind)}

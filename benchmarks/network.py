@@ -1,8 +1,8 @@
-"""Time of the neighbour kernels, of the networks, and of all that takes a mesh to its embedding, on one core.
+"""Time message passing, the networks, and the whole way from a mesh to its embedding, on one core.
 
 Usage: python benchmarks/network.py [--points 6000]
 
-The paper's network is also timed as written with PyTorch Geometric, if that is installed (extra: peers).
+The paper's network is also timed in PyTorch Geometric, if that is installed (extra: peers).
 """
 
 from __future__ import annotations
@@ -18,14 +18,14 @@ import torch
 
 from anisomesh.embedding.direct import embed
 from anisomesh.learn.inference.predict import predict
-from anisomesh.learn.models.hierarchy import N_EDGE, pyramid
+from anisomesh.learn.models.hierarchy import N_EDGE_FEATURES, graph_hierarchy
 from anisomesh.learn.models.messages import (
-    largest_by_scatter,
-    largest_of_neighbours,
+    max_aggregation,
+    max_by_scatter,
+    mean_aggregation,
     mean_by_scatter,
-    mean_of_neighbours,
 )
-from anisomesh.learn.models.paper import PaperNetwork, PaperOptions, seen_of
+from anisomesh.learn.models.paper import PaperNetwork, PaperOptions, paper_input
 from anisomesh.learn.models.stretch import NetworkOptions, StretchNetwork
 from anisomesh.mesh.surface import Surface
 from anisomesh.metric.tensors import compute_metric
@@ -34,11 +34,11 @@ from anisomesh.shapes.analytic import torus
 RUNS = 10
 CHANNELS = 64
 PAPER_CHANNELS = 256
-STEPS = (10, 3)  # of the direct embedding: the default, and as few as give most of it
+EMBEDDING_ITERATIONS = (10, 3)  # the default, and few that give most of the quality
 
 
 def best(work: Callable[[], object]) -> float:
-    """Return the least of some times of this work, in milliseconds, after one that does not count."""
+    """Return the least time of the work over ``RUNS`` runs, in milliseconds, after a warm-up run."""
     work()
     times = []
     for _ in range(RUNS):
@@ -49,7 +49,7 @@ def best(work: Callable[[], object]) -> float:
 
 
 def ring(n: int) -> Surface:
-    """Return a torus of about n points with a little noise, too little to be taken away."""
+    """Return a torus of about n points with noise too small to be removed."""
     around = round(np.sqrt(2.4 * n))
     surface = torus(1.0, 0.35, around, round(n / around))
     shaken = np.random.default_rng(0).normal(0.0, 0.02 * surface.edge_lengths.mean(), surface.points.shape)
@@ -57,27 +57,27 @@ def ring(n: int) -> Surface:
 
 
 def kernels(surface: Surface) -> list[tuple[str, float]]:
-    graph = pyramid(surface, NetworkOptions().scales).scales[0].graph
+    graph = graph_hierarchy(surface, NetworkOptions().scales).levels[0].graph
     own, sent = (torch.randn(surface.n_points, CHANNELS) for _ in range(2))
-    weight = torch.randn(N_EDGE, CHANNELS)
+    weight = torch.randn(N_EDGE_FEATURES, CHANNELS)
     return [
-        ("mean of neighbours, kernel", best(lambda: mean_of_neighbours(own, sent, weight, graph, 0.1))),
-        ("mean of neighbours, scatter", best(lambda: mean_by_scatter(own, sent, weight, graph, 0.1))),
-        ("largest of neighbours, kernel", best(lambda: largest_of_neighbours(sent, weight, graph))),
-        ("largest of neighbours, scatter", best(lambda: largest_by_scatter(sent, weight, graph))),
+        ("mean aggregation, kernel", best(lambda: mean_aggregation(own, sent, weight, graph, 0.1))),
+        ("mean aggregation, scatter", best(lambda: mean_by_scatter(own, sent, weight, graph, 0.1))),
+        ("maximum aggregation, kernel", best(lambda: max_aggregation(sent, weight, graph))),
+        ("maximum aggregation, scatter", best(lambda: max_by_scatter(sent, weight, graph))),
     ]
 
 
 def networks(surface: Surface) -> list[tuple[str, float]]:
     options = NetworkOptions()
-    seen, paper_sees = pyramid(surface, options.scales), seen_of(surface)
+    hierarchy, inputs = graph_hierarchy(surface, options.scales), paper_input(surface)
     network = StretchNetwork(options).eval()
     paper = PaperNetwork(PaperOptions(channels=PAPER_CHANNELS)).eval()
     count = sum(value.numel() for value in network.parameters())
     rows = [
-        ("graphs of all scales", best(lambda: pyramid(surface, options.scales))),
-        (f"default network, {count:,} parameters", best(lambda: network(seen))),
-        (f"paper's network, ours, {PAPER_CHANNELS} channels", best(lambda: paper(paper_sees))),
+        ("graph hierarchy", best(lambda: graph_hierarchy(surface, options.scales))),
+        (f"default network, {count:,} parameters", best(lambda: network(hierarchy))),
+        (f"paper's network, ours, {PAPER_CHANNELS} channels", best(lambda: paper(inputs))),
     ]
     if importlib.util.find_spec("torch_geometric") is None:
         return rows
@@ -87,7 +87,7 @@ def networks(surface: Surface) -> list[tuple[str, float]]:
     ends = np.concatenate([surface.edges, surface.edges[:, ::-1]]).T
     edges, positions = torch.from_numpy(ends.astype(np.int64)), torch.from_numpy(np.array(surface.points))
     count = sum(value.numel() for value in theirs.parameters())
-    milliseconds = best(lambda: theirs(paper_sees.values, edges, positions))
+    milliseconds = best(lambda: theirs(inputs.values, edges, positions))
     return [*rows, (f"paper's network, PyTorch Geometric, {count:,} parameters", milliseconds)]
 
 
@@ -96,13 +96,13 @@ def embeddings(surface: Surface) -> list[tuple[str, float]]:
     found = predict(surface)
     assert found.noise == 0.0
     rows = [("curvature metric", best(lambda: compute_metric(surface)))]
-    for steps in STEPS:
-        made = best(lambda steps=steps: embed(surface, tensors, max_iterations=steps))
-        whole = best(lambda steps=steps: embed(surface, predict(surface).tensors, max_iterations=steps))
+    for iterations in EMBEDDING_ITERATIONS:
+        made = best(lambda n=iterations: embed(surface, tensors, max_iterations=n))
+        whole = best(lambda n=iterations: embed(surface, predict(surface).tensors, max_iterations=n))
         rows += [
-            (f"direct embedding, {steps} steps, metric given", made),
-            (f"direct embedding, {steps} steps, with its curvature metric", rows[0][1] + made),
-            (f"neural embedding: graphs, network, {steps} steps", whole),
+            (f"direct embedding, {iterations} iterations, metric precomputed", made),
+            (f"direct embedding, {iterations} iterations, with the curvature metric", rows[0][1] + made),
+            (f"neural embedding: hierarchy, network, {iterations} iterations", whole),
         ]
     return rows
 

@@ -1,4 +1,4 @@
-"""The paper's network written with PyTorch Geometric, as a user of that library would: what ours is compared with."""
+"""The paper's network in PyTorch Geometric, written as a user of that library would, for comparison."""
 
 from __future__ import annotations
 
@@ -66,7 +66,7 @@ class Network(nn.Module):
 
 
 def interpolated(x: Tensor, positions: Tensor, kept: Tensor) -> Tensor:
-    """Return values at all positions from those at the ones kept, by inverse distance to the nearest three."""
+    """Return values at all positions from the three nearest kept nodes, weighted by inverse distance."""
     distance, nearest = cKDTree(kept.numpy()).query(positions.numpy(), k=min(NEAREST, len(kept)))
     weight = 1.0 / torch.from_numpy(distance).float().clamp(min=1e-12)
     weight = weight / weight.sum(dim=1, keepdim=True)

@@ -1,11 +1,11 @@
-"""How far the metric of a network is from the one wanted, on items of a data set that it was not trained with.
+"""Error of the metric predicted by a network on the validation items of a data set.
 
 Usage: python benchmarks/validation.py ITEMS [WEIGHTS ...]
 
-ITEMS is a folder made by ``anisomesh dataset build``; WEIGHTS are files, or names of networks of the package. Of every
-validation item, without noise: the Frobenius norm of the difference of the logarithms of the two metrics, mean over the
-surface where the curvature is trusted, over that of predicting no stretch. A row is the mean over items of one kind of
-mesh, designed shapes (where many edges are flat, as on machine parts) apart from others.
+ITEMS is a folder made by ``anisomesh dataset build``; WEIGHTS are files, or names of pretrained networks. The error of
+an item, without noise, is the Frobenius norm of the difference of the logarithms of the two metrics, averaged over the
+surface where the curvature is reliable, over the norm for a prediction of no stretch. A row is the mean over items of
+one kind of mesh, separately for designed shapes (with many flat edges, such as machine parts) and others.
 """
 
 from __future__ import annotations
@@ -16,30 +16,30 @@ from collections import defaultdict
 from pathlib import Path
 
 import numpy as np
-
 from anisomesh.estimate import DESIGNED
+
 from anisomesh.features.detect import share_of_flat_edges
 from anisomesh.learn.data.items import Item, load_item
 from anisomesh.learn.data.manifest import files_of
 from anisomesh.learn.inference.predict import predict
-from anisomesh.learn.inference.pretrained import shipped_weights
+from anisomesh.learn.inference.pretrained import pretrained_networks
 from anisomesh.mesh.geometry import sums_at_points
 from rotation import logarithm
 
 
 def error(item: Item, weights: str) -> float:
-    """Return the error of the metric predicted, over that of predicting no stretch."""
-    surface, wanted = item.surface, logarithm(item.tensors)
+    """Return the error of the predicted metric over the error of no stretch."""
+    surface, target = item.surface, logarithm(item.tensors)
     found = logarithm(predict(surface, weights, denoise=False).tensors)
     area = sums_at_points(surface.face_areas, surface.faces, surface.n_points) * item.trusted
-    off, all_of_it = (area @ np.linalg.norm(each, axis=(1, 2)) for each in (found - wanted, wanted))
-    return float(off / all_of_it)
+    error_sum, target_sum = (area @ np.linalg.norm(each, axis=(1, 2)) for each in (found - target, target))
+    return float(error_sum / target_sum)
 
 
 def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("items", type=Path)
-    parser.add_argument("weights", nargs="*", default=list(shipped_weights()))
+    parser.add_argument("weights", nargs="*", default=pretrained_networks())
     asked = parser.parse_args()
     groups: dict[tuple[str, str], list[Item]] = defaultdict(list)
     paths = files_of(asked.items).validation

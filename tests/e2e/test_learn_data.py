@@ -14,10 +14,12 @@ import typer
 import anisomesh
 from anisomesh.cli.dataset import app
 from anisomesh.errors import MeshFileError, OptionError
-from anisomesh.learn.data.build import build, sources_of
+from anisomesh.learn.data.build import build
 from anisomesh.learn.data.items import load_item
 from anisomesh.learn.data.manifest import MANIFEST, files_of, read_manifest
 from anisomesh.learn.data.recipe import VARIANTS, Recipe
+from anisomesh.learn.data.sources import sources_of
+from anisomesh.pipeline import remesh
 from anisomesh.shapes.analytic import ellipsoid, sphere, torus
 
 RECIPE = Recipe(target=200, variants=("decimated",))
@@ -47,7 +49,7 @@ def folder(tmp_path):
 def test_a_build_keeps_drops_and_lists_and_a_second_one_does_nothing(folder, tmp_path):
     out, calls = tmp_path / "out", []
     recipe = Recipe(target=200, variants=("decimated",), min_stretch=1.2)
-    rows = build(sources_of(folder, 1), out, recipe, workers=2, on_row=lambda *step: calls.append(step))
+    rows = build(sources_of(folder, 1), out, recipe, remesh, workers=2, on_row=lambda *step: calls.append(step))
     status = {row["name"]: row["status"] for row in rows}
     good = {"egg": "kept", "egg2": "kept", "more-ring": "kept", "blobs-0000": "kept"}
     assert status == {**good, "ball": "dropped", "bad": "failed"}
@@ -61,21 +63,22 @@ def test_a_build_keeps_drops_and_lists_and_a_second_one_does_nothing(folder, tmp
             assert len(item.points) == entry["points"]
     assert sorted(number for _, number, _ in calls) == [1, 2, 3, 4, 5, 6]
     calls.clear()
-    again = build(sources_of(folder, 1), out, recipe, workers=2, on_row=lambda *step: calls.append(step))
+    again = build(sources_of(folder, 1), out, recipe, remesh, workers=2, on_row=lambda *step: calls.append(step))
     assert (again, calls) == (rows, [])
     anisomesh.save(ellipsoid((1.0, 0.6, 0.3), 2), folder / "egg.ply")
     (out / rows[-1]["items"][0]["file"]).unlink()
-    build(sources_of(folder, 1), out, recipe, workers=2, on_row=lambda *step: calls.append(step))
+    build(sources_of(folder, 1), out, recipe, remesh, workers=2, on_row=lambda *step: calls.append(step))
     assert {row["name"] for row, _, _ in calls} == {"egg", rows[-1]["name"]}  # what has changed, or is gone
 
 
 def test_a_build_that_was_killed_goes_on(folder, tmp_path):
     out = tmp_path / "out"
     code = (
-        "from pathlib import Path; from anisomesh.learn.data.build import *\n"
+        "from pathlib import Path; from anisomesh.learn.data.build import build\n"
+        "from anisomesh.learn.data.sources import sources_of; from anisomesh.pipeline import remesh\n"
         "from anisomesh.learn.data.recipe import Recipe\n"
         f"if __name__ == '__main__': build(sources_of(Path({str(folder)!r}), 0), Path({str(out)!r}), "
-        "Recipe(target=200, variants=('decimated',)), workers=1)"
+        "Recipe(target=200, variants=('decimated',)), remesh, workers=1)"
     )
     script = tmp_path / "run.py"
     script.write_text(code)
@@ -93,7 +96,7 @@ def test_a_build_that_was_killed_goes_on(folder, tmp_path):
     with (out / MANIFEST).open("a") as file:
         file.write('{"name": "half a ro')
     made = []
-    rows = build(sources_of(folder, 0), out, RECIPE, workers=2, on_row=lambda row, *_: made.append(row["name"]))
+    rows = build(sources_of(folder, 0), out, RECIPE, remesh, workers=2, on_row=lambda row, *_: made.append(row["name"]))
     assert len(rows) == 5
     assert set(made) == {row["name"] for row in rows} - {row["name"] for row in before}
     assert len(read_manifest(out)) == 5
@@ -101,13 +104,14 @@ def test_a_build_that_was_killed_goes_on(folder, tmp_path):
 
 def test_the_list_has_the_sources_asked_for_and_their_present_families(folder, tmp_path):
     out, recipe = tmp_path / "out", Recipe(target=200, variants=())
-    build(sources_of(folder, 2), out, recipe, workers=2)
+    build(sources_of(folder, 2), out, recipe, remesh, workers=2)
     (folder / "odd.ply").mkdir()  # no mesh, in spite of its name
     files = [path.relative_to(folder).as_posix() for path in sorted(folder.rglob("*.ply")) if path.is_file()]
     list_ = "".join(f"{file},{'one' if 'egg' in file else file}\n" for file in files)
     (folder / "manifest.csv").write_text("\ufefffile,family\n" + list_, encoding="utf-8")
     made = []
-    rows = build(sources_of(folder, 1), out, recipe, validation=0.6, workers=2, on_row=lambda row, *_: made.append(row))
+    sources = sources_of(folder, 1, validation=0.6)
+    rows = build(sources, out, recipe, remesh, workers=2, on_row=lambda row, *_: made.append(row))
     (folder / "odd.ply").rmdir()
     assert made == []
     assert read_manifest(out) == rows
@@ -121,18 +125,16 @@ def test_the_list_has_the_sources_asked_for_and_their_present_families(folder, t
 
 
 def test_the_split_depends_on_the_family_alone(folder):
-    from anisomesh.learn.data.build import _start
-
     splits = {}
-    for source in sources_of(folder, 300):
-        splits.setdefault(source.family, set()).add(_start(source, RECIPE, 0.2)["split"])
+    for source in sources_of(folder, 300, validation=0.2):
+        splits.setdefault(source.family, set()).add(source.split)
     assert all(len(found) == 1 for found in splits.values())
     share = np.mean([found == {"validation"} for found in splits.values()])
     assert 0.12 < share < 0.28
 
 
 def test_wrong_folders_and_lists_are_refused(tmp_path):
-    with pytest.raises(OptionError, match="no folder"):
+    with pytest.raises(OptionError, match="not a folder"):
         sources_of(tmp_path / "none", 3)
     with pytest.raises(OptionError, match="no mesh"):
         sources_of(tmp_path, 0)

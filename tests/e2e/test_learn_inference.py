@@ -9,7 +9,7 @@ import anisomesh  # noqa: E402
 from anisomesh.errors import OptionError  # noqa: E402
 from anisomesh.evaluation.report import evaluate  # noqa: E402
 from anisomesh.learn.inference.predict import NOISE_FLOOR, predict  # noqa: E402
-from anisomesh.learn.inference.pretrained import shipped_weights, weights_path  # noqa: E402
+from anisomesh.learn.inference.pretrained import pretrained_networks, weights_path  # noqa: E402
 from anisomesh.learn.models.checkpoint import load_weights  # noqa: E402
 from anisomesh.mesh.noise import with_noise  # noqa: E402
 from anisomesh.mesh.surface import Surface  # noqa: E402
@@ -29,7 +29,7 @@ def unit_torus(n_major=90, n_minor=36):
 
 
 def test_the_default_network_is_there_and_says_what_it_is():
-    assert "default" in shipped_weights()
+    assert "default" in pretrained_networks()
     network, facts = load_weights(weights_path(None))
     assert network.options.scales >= 3
     assert {"epoch", "validation 0", "training"} <= set(facts)
@@ -156,7 +156,7 @@ def test_weights_and_devices_that_are_not_there(egg, tmp_path):
             anisomesh.remesh(egg, n_vertices=100, embedding="neural", device="cuda")
 
 
-def test_the_command_takes_the_shipped_network(egg, tmp_path, run_cli):
+def test_the_command_takes_the_pretrained_network(egg, tmp_path, run_cli):
     anisomesh.save(egg, tmp_path / "in.ply")
     done = run_cli("remesh", tmp_path / "in.ply", "-o", tmp_path / "out.ply", "-n", 200, "--embedding", "hybrid")
     assert done.returncode == 0, done.stderr

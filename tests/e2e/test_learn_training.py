@@ -21,7 +21,7 @@ import anisomesh  # noqa: E402
 from anisomesh.errors import OptionError  # noqa: E402
 from anisomesh.learn.data.items import load_item, save_item  # noqa: E402
 from anisomesh.learn.data.make import items_of_blobs  # noqa: E402
-from anisomesh.learn.data.manifest import Files, files_of  # noqa: E402
+from anisomesh.learn.data.manifest import ItemFiles, files_of  # noqa: E402
 from anisomesh.learn.data.recipe import Recipe  # noqa: E402
 from anisomesh.learn.inference.predict import predict  # noqa: E402
 from anisomesh.learn.inference.pretrained import weights_path  # noqa: E402
@@ -45,9 +45,8 @@ def files(tmp_path_factory):
     folder = tmp_path_factory.mktemp("items")
     paths = []
     for seed in range(2):
-        made = items_of_blobs(
-            Blobs.random(np.random.default_rng(seed)), Recipe(target=300), np.random.default_rng(seed)
-        )
+        blobs = Blobs.random(np.random.default_rng(seed))
+        made = items_of_blobs(blobs, Recipe(target=300), np.random.default_rng(seed), anisomesh.remesh)
         for entry in made:
             paths.append(folder / f"blobs-{seed}.{entry.kind}.npz")
             save_item(entry.item, paths[-1])
@@ -123,8 +122,8 @@ def test_a_run_does_not_go_on_with_other_items_or_without_a_checkpoint(files, tm
         train(options(tmp_path / "none"), files, resume=True)
     train(options(tmp_path / "run", epochs=1), files)
     others = (
-        Files(training=files.training[::-1], validation=files.validation),
-        Files(training=[*files.training, files.validation[0]], validation=files.validation[1:]),
+        ItemFiles(training=files.training[::-1], validation=files.validation),
+        ItemFiles(training=[*files.training, files.validation[0]], validation=files.validation[1:]),
     )
     for other in others:
         with pytest.raises(WeightsError, match="other items"):
@@ -214,11 +213,11 @@ def test_a_run_is_not_overwritten_and_not_mixed_with_another(files, tmp_path):
         train(options(tmp_path / "run", epochs=1), files)
     with pytest.raises(WeightsError, match="another rate"):
         train(options(tmp_path / "run", epochs=1, rate=1e-4), files, resume=True)
-    fewer = Files(training=files.training[:2], validation=files.validation)
+    fewer = ItemFiles(training=files.training[:2], validation=files.validation)
     with pytest.raises(WeightsError, match="other items"):
         train(options(tmp_path / "run", epochs=1), fewer, resume=True)
     with pytest.raises(OptionError, match="no items"):
-        train(options(tmp_path / "none"), Files(training=[], validation=[]))
+        train(options(tmp_path / "none"), ItemFiles(training=[], validation=[]))
     path = tmp_path / "run" / CHECKPOINT
     path.write_bytes(path.read_bytes()[:1000])
     with pytest.raises(WeightsError, match="safetensors"):
@@ -275,7 +274,7 @@ def test_folders_of_a_configuration_are_relative_to_its_file(tmp_path):
 @pytest.mark.parametrize(
     ("name", "network", "data"), [("default-more", "default", "items-given"), ("paper", "paper", "items")]
 )
-def test_shipped_configurations_are_those_of_the_shipped_networks(name, network, data):
+def test_pretrained_configurations_are_those_of_the_pretrained_networks(name, network, data):
     loaded = load_training(name)
     assert (loaded.data, loaded.out) == (data, name)  # relative to the current folder
     weights, facts = load_weights(weights_path(network))

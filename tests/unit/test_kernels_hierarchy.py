@@ -1,11 +1,11 @@
-"""What the kernels of the pyramid write, against NumPy and SciPy on whole arrays."""
+"""What the kernels of the graph hierarchy compute, against NumPy and SciPy on whole arrays."""
 
 import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
-from anisomesh._kernels import pyramid as kernels
-from anisomesh.learn.models.graph import graph_of
+from anisomesh._kernels import graph_hierarchy as kernels
+from anisomesh.learn.models.graph import graph_from_edges
 from anisomesh.mesh.geometry import unit
 from anisomesh.metric.tangent import tangent_frames
 from anisomesh.shapes.analytic import torus
@@ -20,7 +20,7 @@ def graph():
     start, end = np.concatenate([surface.edges, surface.edges[:, ::-1]]).T
     gone = rng.random(surface.n_points) < EMPTY
     kept = ~(gone[start] | gone[end])
-    return graph_of(surface.n_points, start[kept], end[kept], np.zeros((int(kept.sum()), 1), dtype=np.float32))
+    return graph_from_edges(surface.n_points, start[kept], end[kept], np.zeros((int(kept.sum()), 1), dtype=np.float32))
 
 
 @pytest.fixture
@@ -66,7 +66,7 @@ def test_frames_are_carried_by_the_smallest_rotation(places):
     _, normals, frames = places
     ancestor = np.random.default_rng(2).integers(0, len(normals), len(normals))
     carry = np.empty((len(normals), 2), dtype=np.float32)
-    kernels.carry_to_points(ancestor, frames, normals, frames, normals, carry)
+    kernels.transport_to_points(ancestor, frames, normals, frames, normals, carry)
     carried = rotations(normals[ancestor], normals).apply(frames[ancestor, 0])
     np.testing.assert_allclose(carry, doubled((frames @ carried[:, :, None])[:, :, 0]), atol=1e-5)
 
@@ -76,7 +76,7 @@ def test_fit_is_the_one_of_ridge_regression(graph):
     angle, bend = rng.uniform(0, np.pi, len(graph.neighbour)), rng.normal(size=len(graph.neighbour))
     turns = np.stack([np.cos(2 * angle), np.sin(2 * angle)], axis=1)
     duals, fit, imbalance = np.empty((len(bend), 3)), np.empty((graph.n_nodes, 3)), np.empty(graph.n_nodes)
-    kernels.fit_directions(graph.first, np.stack([turns, 9 * turns], axis=1), bend, 0.02, duals, fit, imbalance)
+    kernels.fit_normal_curvature(graph.first, np.stack([turns, 9 * turns], axis=1), bend, 0.02, duals, fit, imbalance)
     for i in range(graph.n_nodes):
         rows = slice(graph.first[i], graph.first[i + 1])
         basis, n = np.concatenate([np.ones((rows.stop - rows.start, 1)), turns[rows]], axis=1), rows.stop - rows.start
@@ -96,7 +96,7 @@ def test_values_of_edges_are_those_of_whole_arrays(graph):
     values, turns, duals = rng.uniform(0.5, 2.0, (n, 4)), rng.normal(size=(n, 2, 2)), rng.normal(size=(n, 3))
     line, mean_length = rng.normal(size=(graph.n_nodes, 2)), rng.uniform(0.5, 2.0, graph.n_nodes)
     along = np.empty((n, 7), dtype=np.float32)
-    kernels.edge_invariants(graph.first, j, values, turns, line, duals, mean_length, along)
+    kernels.edge_features(graph.first, j, values, turns, line, duals, mean_length, along)
     wanted = [np.log(values[:, 0] / mean_length[i]), *values[:, 1:].T, (line[i] * turns[:, 0]).sum(axis=1)]
     wanted += [(line[j] * turns[:, 1]).sum(axis=1), duals[:, 0] * np.diff(graph.first)[i]]
     np.testing.assert_allclose(along, np.stack(wanted, axis=1), rtol=1e-5, atol=1e-6)
@@ -105,7 +105,7 @@ def test_values_of_edges_are_those_of_whole_arrays(graph):
 def test_spread_is_that_of_numpy(graph):
     values = np.random.default_rng(4).normal(size=(len(graph.neighbour), 2))
     spread = np.empty((graph.n_nodes, 2, 4))
-    kernels.spread_at_nodes(graph.first, values, spread)
+    kernels.edge_statistics(graph.first, values, spread)
     for i in range(graph.n_nodes):
         mine = values[graph.first[i] : graph.first[i + 1]]
         wanted = (
@@ -118,13 +118,13 @@ def test_the_independent_set_is_the_greedy_one(graph):
     n = graph.n_nodes
     order = np.random.default_rng(5).permutation(n)
     state, owner = np.zeros(n, dtype=np.int8), np.zeros(n, dtype=np.int64)
-    kernels.independent_set(graph.first, graph.neighbour, order, state, owner)
+    kernels.maximal_independent_set(graph.first, graph.neighbour, order, state, owner)
     around = [set(graph.neighbour[graph.first[i] : graph.first[i + 1]].tolist()) for i in range(n)]
     taken = []
     for i in order.tolist():
         if not around[i] & set(taken):
             taken.append(i)
-    assert sorted(taken) == np.flatnonzero(state == kernels.TAKEN).tolist()
+    assert sorted(taken) == np.flatnonzero(state == kernels.IN_SET).tolist()
     for i in range(n):
         first = next(other for other in taken if other == i or other in around[i])
         assert sorted(taken)[owner[i]] == first

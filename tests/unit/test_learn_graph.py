@@ -7,14 +7,14 @@ import pytest
 
 torch = pytest.importorskip("torch")
 
-from anisomesh.learn.models.graph import graph_of, hierarchy  # noqa: E402
+from anisomesh.learn.models.graph import coarsen, graph_from_edges  # noqa: E402
 from anisomesh.learn.models.messages import (  # noqa: E402
-    distance_by_gather,
-    distance_of_neighbours,
-    largest_by_scatter,
-    largest_of_neighbours,
+    distances_by_gather,
+    max_aggregation,
+    max_by_scatter,
+    mean_aggregation,
     mean_by_scatter,
-    mean_of_neighbours,
+    neighbour_distances,
 )
 from anisomesh.mesh.surface import Surface  # noqa: E402
 from anisomesh.shapes.analytic import open_patch, sphere, torus  # noqa: E402
@@ -24,14 +24,14 @@ def random_graph(n=40, n_edges=120, values=3, seed=0):
     """Return a graph with nodes that have no edge, and edges that are there twice."""
     rng = np.random.default_rng(seed)
     start, end = rng.integers(0, n // 2, n_edges), rng.integers(0, n, n_edges)
-    return graph_of(
+    return graph_from_edges(
         n, start.astype(np.int32), end.astype(np.int32), rng.normal(size=(n_edges, values)).astype(np.float32)
     )
 
 
 def mesh_graph(surface):
     start, end = np.concatenate([surface.edges, surface.edges[:, ::-1]]).T
-    return graph_of(surface.n_points, start, end, np.ones((len(start), 1), dtype=np.float32))
+    return graph_from_edges(surface.n_points, start, end, np.ones((len(start), 1), dtype=np.float32))
 
 
 def shaken(surface, seed=0):
@@ -46,22 +46,22 @@ def shaken(surface, seed=0):
 def test_largest_messages_are_those_of_brute_force(seed):
     graph = random_graph(seed=seed)
     sent, weight = torch.randn(40, 7), torch.randn(3, 7)
-    found = largest_of_neighbours(sent, weight, graph)
+    found = max_aggregation(sent, weight, graph)
     for i in range(40):
         edges = range(graph.first[i], graph.first[i + 1])
-        messages = [sent[graph.neighbour[e]] + torch.from_numpy(graph.along[e]) @ weight for e in edges]
+        messages = [sent[graph.neighbour[e]] + torch.from_numpy(graph.features[e]) @ weight for e in edges]
         wanted = torch.stack(messages).amax(dim=0) if messages else torch.zeros(7)
         torch.testing.assert_close(found[i], wanted)
-    torch.testing.assert_close(found, largest_by_scatter(sent, weight, graph))
+    torch.testing.assert_close(found, max_by_scatter(sent, weight, graph))
 
 
 def test_derivatives_of_the_kernel_are_those_of_plain_torch():
     graph = random_graph(seed=4)
     sent, weight = torch.randn(40, 7, requires_grad=True), torch.randn(3, 7, requires_grad=True)
-    along = torch.randn(graph.along.shape, requires_grad=True)
+    along = torch.randn(graph.features.shape, requires_grad=True)
     towards, inputs = torch.randn(40, 7), (sent, weight, along)
-    mine = torch.autograd.grad(largest_of_neighbours(sent, weight, graph, along), inputs, towards)
-    theirs = torch.autograd.grad(largest_by_scatter(sent, weight, graph, along), inputs, towards)
+    mine = torch.autograd.grad(max_aggregation(sent, weight, graph, along), inputs, towards)
+    theirs = torch.autograd.grad(max_by_scatter(sent, weight, graph, along), inputs, towards)
     for a, b in zip(mine, theirs, strict=True):
         torch.testing.assert_close(a, b)
     assert all(grad.abs().sum() > 0 for grad in mine)
@@ -74,13 +74,13 @@ def test_distances_of_values_and_their_derivatives_are_those_of_plain_torch(chan
     values = torch.randn(40, channels)
     values[graph.neighbour[:1]] = values[graph.node[:1]]  # equal values have no direction
     values.requires_grad_()
-    found = distance_of_neighbours(values, graph)
+    found = neighbour_distances(values, graph)
     for e in range(1, 10):
         ends = values[int(graph.node[e])], values[int(graph.neighbour[e])]
         assert float(found[e].detach()) == pytest.approx(float((ends[0] - ends[1]).norm().detach()), rel=1e-5, abs=2e-6)
     towards = torch.randn(len(found), 1)
     (mine,) = torch.autograd.grad(found, values, towards)
-    (theirs,) = torch.autograd.grad(distance_by_gather(values, graph), values, towards)
+    (theirs,) = torch.autograd.grad(distances_by_gather(values, graph), values, towards)
     torch.testing.assert_close(mine, theirs, rtol=1e-4, atol=1e-5)
     assert mine.abs().sum() > 0.0
 
@@ -89,15 +89,15 @@ def test_distances_of_values_and_their_derivatives_are_those_of_plain_torch(chan
 def test_mean_messages_and_their_derivatives_are_those_of_brute_force_and_plain_torch(seed):
     graph = random_graph(seed=seed)
     own, sent, weight = torch.randn(40, 7), torch.randn(40, 7), torch.randn(3, 7)
-    found = mean_of_neighbours(own, sent, weight, graph, 0.1)
+    found = mean_aggregation(own, sent, weight, graph, 0.1)
     for i in range(40):
         edges = range(graph.first[i], graph.first[i + 1])
-        messages = [own[i] + sent[graph.neighbour[e]] + torch.from_numpy(graph.along[e]) @ weight for e in edges]
+        messages = [own[i] + sent[graph.neighbour[e]] + torch.from_numpy(graph.features[e]) @ weight for e in edges]
         leaky = [torch.where(message > 0.0, message, 0.1 * message) for message in messages]
         torch.testing.assert_close(found[i], torch.stack(leaky).mean(dim=0) if leaky else torch.zeros(7))
     inputs = [value.requires_grad_() for value in (own, sent, weight)]
     towards = torch.randn(40, 7)
-    mine = torch.autograd.grad(mean_of_neighbours(*inputs, graph, 0.1), inputs, towards)
+    mine = torch.autograd.grad(mean_aggregation(*inputs, graph, 0.1), inputs, towards)
     theirs = torch.autograd.grad(mean_by_scatter(*inputs, graph, 0.1), inputs, towards)
     for a, b in zip(mine, theirs, strict=True):
         torch.testing.assert_close(a, b, rtol=1e-4, atol=1e-5)
@@ -108,14 +108,14 @@ def test_derivatives_agree_with_differences():
     graph = random_graph(seed=5)
     sent, weight, towards = torch.randn(40, 2), torch.randn(3, 2), torch.randn(40, 2)
     sent.requires_grad_(True)
-    (gradient,) = torch.autograd.grad((largest_of_neighbours(sent, weight, graph) * towards).sum(), sent)
+    (gradient,) = torch.autograd.grad((max_aggregation(sent, weight, graph) * towards).sum(), sent)
     step = 1e-2
     with torch.no_grad():
         for j, c in ((0, 0), (3, 1), (11, 0)):
             ahead, back = sent.clone(), sent.clone()
             ahead[j, c] += step
             back[j, c] -= step
-            values = [(largest_of_neighbours(x, weight, graph) * towards).sum() for x in (ahead, back)]
+            values = [(max_aggregation(x, weight, graph) * towards).sum() for x in (ahead, back)]
             assert float(gradient[j, c]) == pytest.approx(float(values[0] - values[1]) / (2 * step), abs=2e-2)
 
 
@@ -123,7 +123,7 @@ def test_derivatives_agree_with_differences():
     "surface", [shaken(sphere(3)), torus(n_major=24, n_minor=12), shaken(open_patch(lambda x, y: x * y, n=9))]
 )
 def test_coarser_graphs_are_maximal_independent_sets(surface):
-    levels = hierarchy(mesh_graph(surface), surface.points, 4)
+    levels = coarsen(mesh_graph(surface), surface.points, 4)
     assert len(levels) == 4
     assert levels[-1].cluster is None
     for level, coarser in pairwise(levels):
@@ -151,7 +151,7 @@ def test_neither_order_nor_motion_changes_the_coarser_graphs():
     other = Surface(
         surface.points[order] @ turn.T + 3.0, np.argsort(order)[surface.faces][rng.permutation(surface.n_faces)]
     )
-    mine, theirs = (hierarchy(mesh_graph(s), s.points, 3) for s in (surface, other))
+    mine, theirs = (coarsen(mesh_graph(s), s.points, 3) for s in (surface, other))
     for a, b in zip(mine, theirs, strict=True):
         assert a.graph.n_nodes == b.graph.n_nodes
     same = mine[0].cluster[order]

@@ -6,12 +6,13 @@ import trimesh
 
 from anisomesh.errors import MeshFileError, OptionError
 from anisomesh.learn.data.items import Item, load_item, save_item
-from anisomesh.learn.data.make import UnsuitableError, evened, items_of_blobs, items_of_mesh
+from anisomesh.learn.data.make import UnsuitableError, even_mesh, items_of_blobs, items_of_mesh
 from anisomesh.learn.data.recipe import Recipe
 from anisomesh.mesh.distance import surface_distance
 from anisomesh.mesh.geometry import thickness
 from anisomesh.metric.curvature import principal_curvatures
 from anisomesh.metric.tensors import curvature_metric, validate_metric
+from anisomesh.pipeline import remesh
 from anisomesh.shapes.analytic import box, ellipsoid, sphere, torus
 from anisomesh.shapes.implicit import Blobs
 
@@ -20,7 +21,7 @@ RECIPE = Recipe(target=500)
 
 @pytest.fixture(scope="module")
 def made():
-    return items_of_mesh(ellipsoid((1.0, 0.5, 0.3), 3), RECIPE, np.random.default_rng(0))
+    return items_of_mesh(ellipsoid((1.0, 0.5, 0.3), 3), RECIPE, np.random.default_rng(0), remesh)
 
 
 def random_item(n=30):
@@ -67,7 +68,7 @@ def test_damaged_files_are_refused(tmp_path, damage):
 def test_a_given_mesh_is_an_item_with_the_metric_measured_on_it():
     surface = ellipsoid((1.0, 0.5, 0.3), 4)  # 2,562 points
     recipe = Recipe(target=1_500, variants=("given",))
-    made = items_of_mesh(surface, recipe, np.random.default_rng(0))
+    made = items_of_mesh(surface, recipe, np.random.default_rng(0), remesh)
     assert [entry.kind for entry in made] == ["even", "given"]
     item = made[1].item
     unit = surface.points / surface.diagonal
@@ -84,7 +85,7 @@ def test_a_given_mesh_is_no_item_if_nothing_is_to_be_learnt_from_it(reason):
     recipe = Recipe(target=100 if reason == "many points" else 600, variants=("given",))
     if reason == "needles":
         surface = torus(1.0, 0.3, 120, 6)
-    assert [entry.kind for entry in items_of_mesh(surface, recipe, np.random.default_rng(0))] == ["even"]
+    assert [entry.kind for entry in items_of_mesh(surface, recipe, np.random.default_rng(0), remesh)] == ["even"]
 
 
 def test_the_items_of_a_mesh_are_its_even_mesh_and_the_variants(made):
@@ -117,7 +118,7 @@ def test_variants_have_the_metric_of_the_clean_mesh_not_their_own(made):
 
 def test_items_of_shapes_by_code_have_exact_curvature_at_every_point():
     blobs = Blobs.random(np.random.default_rng(3))
-    made = items_of_blobs(blobs, RECIPE, np.random.default_rng(0))
+    made = items_of_blobs(blobs, RECIPE, np.random.default_rng(0), remesh)
     assert [entry.kind for entry in made] == ["even", "decimated", "stretched"]
     frames = []
     for entry in made:
@@ -132,24 +133,24 @@ def test_items_of_shapes_by_code_have_exact_curvature_at_every_point():
 def test_round_and_flat_shapes_are_unsuitable():
     for shape in (sphere(3), box(n=8)):
         with pytest.raises(UnsuitableError, match="flat or round everywhere"):
-            items_of_mesh(shape, Recipe(target=500, min_stretch=1.35), np.random.default_rng(0))
+            items_of_mesh(shape, Recipe(target=500, min_stretch=1.35), np.random.default_rng(0), remesh)
 
 
 def test_an_even_mesh_of_the_right_size_is_left_alone_and_others_are_not():
     good = sphere(3)
-    assert evened(good, Recipe(target=600)) is good
+    assert even_mesh(good, Recipe(target=600), remesh) is good
     for recipe, mesh in (
         (Recipe(target=300), good),
         (Recipe(target=600), good.with_points(good.points * [1.0, 1.0, 0.3])),
         (Recipe(target=600), box(n=1)),
     ):
-        made = evened(mesh, recipe)
+        made = even_mesh(mesh, recipe, remesh)
         assert made.n_points == recipe.target
         assert thickness(made.points[made.faces]).mean() > 0.3
 
 
 def test_the_same_seed_gives_the_same_items(made):
-    again = items_of_mesh(ellipsoid((1.0, 0.5, 0.3), 3), RECIPE, np.random.default_rng(0))
+    again = items_of_mesh(ellipsoid((1.0, 0.5, 0.3), 3), RECIPE, np.random.default_rng(0), remesh)
     for first, second in zip(made, again, strict=True):
         np.testing.assert_array_equal(first.item.points, second.item.points)
         np.testing.assert_array_equal(first.item.extra, second.item.extra)
@@ -164,7 +165,7 @@ def test_recipes_that_cannot_be_are_refused(wrong):
 @pytest.mark.parametrize("surface", [box(n=3), torus()])
 def test_evening_with_tetwild_keeps_the_shape_and_which_side_is_out(surface):
     pytest.importorskip("pytetwild")
-    even = evened(surface, Recipe(target=600, evening="tetwild"))
+    even = even_mesh(surface, Recipe(target=600, evening="tetwild"), remesh)
     assert even.n_points == 600
     assert even.area == pytest.approx(surface.area, rel=0.02)
     volumes = [trimesh.Trimesh(each.points, each.faces, process=False).volume for each in (even, surface)]
@@ -174,4 +175,4 @@ def test_evening_with_tetwild_keeps_the_shape_and_which_side_is_out(surface):
 def test_evening_with_a_package_that_is_not_there_names_it(monkeypatch):
     monkeypatch.setattr("importlib.util.find_spec", lambda name: None)
     with pytest.raises(OptionError, match="pip install pytetwild"):
-        evened(sphere(1), Recipe(target=600, evening="tetwild"))
+        even_mesh(sphere(1), Recipe(target=600, evening="tetwild"), remesh)

@@ -10,9 +10,9 @@ from anisomesh.learn.models.paper import (  # noqa: E402
     PaperConvolution,
     PaperNetwork,
     PaperOptions,
-    TopK,
+    TopKPooling,
     interpolated,
-    seen_of,
+    paper_input,
 )
 from anisomesh.learn.training.config import TrainingOptions  # noqa: E402
 from anisomesh.learn.training.losses import corner_dots, cosine_loss, dot_loss, l2_loss, laplacian_loss  # noqa: E402
@@ -42,7 +42,7 @@ def turned(values, seed=1):
 def test_the_convolution_is_the_formula_of_the_paper():
     torch.manual_seed(0)
     surface = sphere(1)
-    seen = seen_of(surface)
+    seen = paper_input(surface)
     layer = PaperConvolution(6, 4)
     b = layer.own.weight
     a = layer.sent.weight - b
@@ -58,7 +58,7 @@ def test_the_convolution_is_the_formula_of_the_paper():
 
 
 def test_pooling_keeps_the_nodes_of_largest_score():
-    pool = TopK(3, 0.5)
+    pool = TopKPooling(3, 0.5)
     x = torch.randn(11, 3)
     values, kept = pool(x)
     score = x @ pool.direction / pool.direction.norm()
@@ -82,7 +82,7 @@ def test_the_network_ignores_the_order_of_points_and_faces():
     order = rng.permutation(surface.n_points)
     other = Surface(surface.points[order], np.argsort(order)[surface.faces][rng.permutation(surface.n_faces)])
     with torch.no_grad():
-        mine, theirs = network(seen_of(surface)), network(seen_of(other))
+        mine, theirs = network(paper_input(surface)), network(paper_input(other))
     assert mine.shape == (surface.n_points, 5)
     torch.testing.assert_close(theirs, mine[order], atol=1e-4, rtol=1e-4)
 
@@ -90,7 +90,7 @@ def test_the_network_ignores_the_order_of_points_and_faces():
 def test_all_weights_of_the_network_take_part():
     torch.manual_seed(0)
     network = PaperNetwork(PaperOptions(channels=8, levels=3))
-    network(seen_of(shaken(torus(n_major=24, n_minor=10)))).square().sum().backward()
+    network(paper_input(shaken(torus(n_major=24, n_minor=10)))).square().sum().backward()
     assert all(value.grad is not None and value.grad.abs().sum() > 0 for value in network.parameters())
 
 
@@ -167,7 +167,7 @@ def test_symmetries_of_the_augmentation_are_ten_and_targets_turn_with_the_mesh()
         example = task.example(item, 0.0, np.random.default_rng(seed), training=True)
         points = example.points.numpy()
         np.testing.assert_allclose(points, surface.points @ turn.T, atol=1e-6)
-        np.testing.assert_allclose(example.seen.values[:, 3:], surface.point_normals @ turn.T * 1.0, atol=1e-5)
+        np.testing.assert_allclose(example.inputs.values[:, 3:], surface.point_normals @ turn.T * 1.0, atol=1e-5)
         moved = torch.cat([example.points, example.extra], dim=1)
         dots = corner_dots(moved, plain.faces)
         torch.testing.assert_close(dots, corner_dots(whole, plain.faces), atol=1e-4, rtol=1e-4)

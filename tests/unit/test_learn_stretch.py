@@ -5,19 +5,24 @@ import pytest
 
 torch = pytest.importorskip("torch")
 
-from anisomesh.learn.data.examples import example_of  # noqa: E402
+from anisomesh.learn.data.examples import stretch_example  # noqa: E402
 from anisomesh.learn.data.items import Item  # noqa: E402
-from anisomesh.learn.models.graph import graph_of  # noqa: E402
-from anisomesh.learn.models.hierarchy import N_EDGE, N_NODE, pyramid  # noqa: E402
+from anisomesh.learn.models.graph import graph_from_edges  # noqa: E402
+from anisomesh.learn.models.hierarchy import N_EDGE_FEATURES, N_NODE_FEATURES, graph_hierarchy  # noqa: E402
 from anisomesh.learn.models.messages import mean_by_scatter  # noqa: E402
-from anisomesh.learn.models.stretch import Block, NetworkOptions, StretchNetwork  # noqa: E402
+from anisomesh.learn.models.stretch import NetworkOptions, ResidualBlock, StretchNetwork  # noqa: E402
 from anisomesh.learn.training.config import TrainingOptions  # noqa: E402
 from anisomesh.learn.training.losses import line_loss, offset_loss  # noqa: E402
 from anisomesh.learn.training.tasks import StretchTask  # noqa: E402
 from anisomesh.mesh.noise import NOISES, with_noise  # noqa: E402
 from anisomesh.mesh.surface import Surface  # noqa: E402
 from anisomesh.metric.curvature import principal_curvatures  # noqa: E402
-from anisomesh.metric.line_field import MOST, directions_of, lines_in, tensors_of  # noqa: E402
+from anisomesh.metric.line_field import (  # noqa: E402
+    MAX_LOG_STRETCH_SQUARED,
+    line_field_components,
+    principal_stretch,
+    tensors_of_line_field,
+)
 from anisomesh.metric.tangent import tangent_frames  # noqa: E402
 from anisomesh.metric.tensors import curvature_metric  # noqa: E402
 from anisomesh.shapes.analytic import ellipsoid, open_patch, sphere, torus  # noqa: E402
@@ -43,10 +48,10 @@ def moved(surface, seed=1):
 
 
 def predicted(network, surface):
-    seen = pyramid(surface, network.options.scales)
+    seen = graph_hierarchy(surface, network.options.scales)
     with torch.no_grad():
         found = network(seen)
-    return tensors_of(found.lines.numpy(), seen.frames), found.offsets.numpy()
+    return tensors_of_line_field(found.line_field.numpy(), seen.frames), found.offsets.numpy()
 
 
 def egg_item():
@@ -63,12 +68,14 @@ def test_lines_come_back_from_tensors_and_tensors_from_lines(seed):
     normals = rng.normal(size=(50, 3))
     frames = tangent_frames(normals / np.linalg.norm(normals, axis=1, keepdims=True))
     lines = rng.normal(size=(50, 2))
-    tensors = tensors_of(lines, frames)
+    tensors = tensors_of_line_field(lines, frames)
     values = np.linalg.eigvalsh(tensors)
     np.testing.assert_allclose(values[:, :2], 1.0, atol=1e-9)
     np.testing.assert_allclose(np.log(values[:, 2]), np.hypot(*lines.T), atol=1e-9)
-    np.testing.assert_allclose(lines_in(frames, *directions_of(tensors)), lines, atol=1e-5)
-    assert np.linalg.eigvalsh(tensors_of(100.0 * lines, frames)).max() <= np.exp(MOST) * (1 + 1e-9)
+    np.testing.assert_allclose(line_field_components(*principal_stretch(tensors), frames), lines, atol=1e-5)
+    assert np.linalg.eigvalsh(tensors_of_line_field(100.0 * lines, frames)).max() <= np.exp(MAX_LOG_STRETCH_SQUARED) * (
+        1 + 1e-9
+    )
 
 
 def test_a_metric_that_is_the_same_all_around_has_no_line_however_large():
@@ -76,7 +83,7 @@ def test_a_metric_that_is_the_same_all_around_has_no_line_however_large():
     normals /= np.linalg.norm(normals, axis=1, keepdims=True)
     across = normals[:, :, None] * normals[:, None, :]
     tensors = across + 4.0 * (np.eye(3) - across)  # as of an embedding that doubles all lengths
-    np.testing.assert_allclose(directions_of(tensors)[1], 0.0, atol=1e-9)
+    np.testing.assert_allclose(principal_stretch(tensors)[1], 0.0, atol=1e-9)
 
 
 def test_the_loss_is_zero_for_the_answer_and_a_distance_elsewhere():
@@ -90,23 +97,23 @@ def test_the_loss_is_zero_for_the_answer_and_a_distance_elsewhere():
 @pytest.mark.parametrize("surface", [sphere(3), torus(n_major=40, n_minor=16)])
 def test_values_of_nodes_and_edges_are_those_of_the_shape(surface):
     surface = surface.with_points(surface.points / surface.diagonal)
-    finest = pyramid(surface, 3).scales[0]
-    assert finest.nodes.shape == (surface.n_points, N_NODE)
-    assert finest.graph.along.shape == (2 * len(surface.edges), N_EDGE)
+    finest = graph_hierarchy(surface, 3).levels[0]
+    assert finest.nodes.shape == (surface.n_points, N_NODE_FEATURES)
+    assert finest.graph.features.shape == (2 * len(surface.edges), N_EDGE_FEATURES)
     if surface.n_points == sphere(3).n_points:
         radius = 1.0 / (2.0 * np.sqrt(3.0))
-        np.testing.assert_allclose(finest.graph.along[:, 1:4], np.arcsinh(1.0 / radius), rtol=0.1)
-        assert np.median(finest.graph.along[:, 1]) == pytest.approx(np.arcsinh(1.0 / radius), rel=0.01)
-    length = np.linalg.norm(finest.turns, axis=1)
+        np.testing.assert_allclose(finest.graph.features[:, 1:4], np.arcsinh(1.0 / radius), rtol=0.1)
+        assert np.median(finest.graph.features[:, 1]) == pytest.approx(np.arcsinh(1.0 / radius), rel=0.01)
+    length = np.linalg.norm(finest.directions, axis=1)
     np.testing.assert_allclose(length, 1.0, atol=1e-6)
 
 
 def test_what_the_network_sees_does_not_change_with_order_or_motion():
     surface = shaken(torus(n_major=40, n_minor=16))
     other, order, _ = moved(surface)
-    mine, theirs = pyramid(surface, 3), pyramid(other, 3)
-    np.testing.assert_allclose(theirs.scales[0].nodes, mine.scales[0].nodes[order], atol=1e-4)
-    for a, b in zip(mine.scales, theirs.scales, strict=True):
+    mine, theirs = graph_hierarchy(surface, 3), graph_hierarchy(other, 3)
+    np.testing.assert_allclose(theirs.levels[0].nodes, mine.levels[0].nodes[order], atol=1e-4)
+    for a, b in zip(mine.levels, theirs.levels, strict=True):
         assert len(a.nodes) == len(b.nodes)
         np.testing.assert_allclose(np.sort(a.nodes, axis=0), np.sort(b.nodes, axis=0), atol=1e-4)
 
@@ -141,12 +148,12 @@ def plain_block(block, x, graph):
 @pytest.mark.parametrize("n_nodes", [1, 2, 600])
 def test_a_block_and_its_derivatives_are_those_of_the_plain_formulas(n_nodes):
     torch.manual_seed(0)
-    graph = pyramid(shaken(torus(n_major=40, n_minor=15)), 1).scales[0].graph
+    graph = graph_hierarchy(shaken(torus(n_major=40, n_minor=15)), 1).levels[0].graph
     if n_nodes < 3:
         ends = np.arange(n_nodes)
-        along = np.random.default_rng(0).normal(size=(n_nodes, N_EDGE)).astype(np.float32)
-        graph = graph_of(n_nodes, ends, ends[::-1], along)
-    block = Block(8)
+        along = np.random.default_rng(0).normal(size=(n_nodes, N_EDGE_FEATURES)).astype(np.float32)
+        graph = graph_from_edges(n_nodes, ends, ends[::-1], along)
+    block = ResidualBlock(8)
     for values in block.parameters():
         torch.nn.init.normal_(values)
     x = torch.randn(n_nodes, 8, requires_grad=True)
@@ -175,7 +182,7 @@ def test_it_does_not_matter_how_many_edges_are_worked_on_at_once(monkeypatch):
     torch.manual_seed(0)
     surface, network = shaken(torus(n_major=24, n_minor=12)), StretchNetwork(SMALL).eval()
     whole, offsets = predicted(network, surface)
-    monkeypatch.setattr("anisomesh.learn.models.stretch._AT_ONCE", 7)
+    monkeypatch.setattr("anisomesh.learn.models.stretch._EDGES_PER_CHUNK", 7)
     parts, other_offsets = predicted(network, surface)
     np.testing.assert_allclose(parts, whole, rtol=1e-5, atol=1e-5)  # entries are about 1, of single precision
     np.testing.assert_allclose(other_offsets, offsets, atol=1e-4 * np.abs(offsets).max())
@@ -183,24 +190,24 @@ def test_it_does_not_matter_how_many_edges_are_worked_on_at_once(monkeypatch):
 
 def test_noise_moves_the_mesh_and_not_the_lines_wanted():
     item = egg_item()
-    clean, noisy = example_of(item, 3), example_of(item, 3, 0.3, np.random.default_rng(0))
-    assert np.abs(clean.pyramid.scales[0].nodes - noisy.pyramid.scales[0].nodes).max() > 0.1
-    length = [torch.linalg.norm(example.lines, dim=1) for example in (clean, noisy)]
+    clean, noisy = stretch_example(item, 3), stretch_example(item, 3, 0.3, np.random.default_rng(0))
+    assert np.abs(clean.hierarchy.levels[0].nodes - noisy.hierarchy.levels[0].nodes).max() > 0.1
+    length = [torch.linalg.norm(example.line_field, dim=1) for example in (clean, noisy)]
     torch.testing.assert_close(*length, atol=1e-4, rtol=1e-4)
     assert float(clean.weight.sum()) == pytest.approx(1.0)
-    tensors = [tensors_of(example.lines.numpy(), example.pyramid.frames) for example in (clean, noisy)]
-    cosine = np.einsum("nx,nx->n", *(directions_of(t)[0] for t in tensors))
+    tensors = [tensors_of_line_field(each.line_field.numpy(), each.hierarchy.frames) for each in (clean, noisy)]
+    cosine = np.einsum("nx,nx->n", *(principal_stretch(t)[0] for t in tensors))
     stretched = length[0].numpy() > 0.3
     assert np.median(np.abs(cosine[stretched])) > 0.95
-    again = example_of(item, 3, 0.3, np.random.default_rng(0))
-    torch.testing.assert_close(again.lines, noisy.lines)
+    again = stretch_example(item, 3, 0.3, np.random.default_rng(0))
+    torch.testing.assert_close(again.line_field, noisy.line_field)
 
 
 @pytest.mark.parametrize("kind", NOISES)
 def test_the_offsets_wanted_take_the_noise_away(kind):
     item = egg_item()
     rng, again = np.random.default_rng(0), np.random.default_rng(0)
-    example = example_of(item, 3, 0.3, rng, kind)
+    example = stretch_example(item, 3, 0.3, rng, kind)
     noisy = with_noise(item.surface, 0.3, again, kind)
     away = np.linalg.norm(noisy.points - item.surface.points, axis=1)
     deviation = {"independent": 0.3 * np.sqrt(3.0), "normal": 0.3, "smooth": 0.15 * np.sqrt(3.0)}[kind]
@@ -230,7 +237,7 @@ def test_a_network_learns_one_shape():
     task = StretchTask(TrainingOptions(data="", out="", network=SMALL))
     network = task.network()
     clean, noisy = (task.example(egg_item(), noise, np.random.default_rng(0), training=False) for noise in (0.0, 0.3))
-    nothing = [task.losses_of_nothing(clean)["lines"], task.losses_of_nothing(noisy)["offsets"]]
+    nothing = [task.baseline_losses(clean)["lines"], task.baseline_losses(noisy)["offsets"]]
     optimiser = torch.optim.AdamW(network.parameters(), lr=5e-3)
     for _ in range(60):
         optimiser.zero_grad()

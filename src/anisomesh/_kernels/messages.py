@@ -1,4 +1,4 @@
-"""What nodes get from their neighbours, largest or mean, how far apart their values are, and the derivatives."""
+"""Kernels of message passing: maximum and mean over neighbours, distances of features, and their gradients."""
 
 from __future__ import annotations
 
@@ -12,67 +12,67 @@ Ints = npt.NDArray[np.int32]
 
 
 @allocating
-def largest_messages(
-    first: Ints, neighbour: Ints, sent: Floats, along: Floats, weight: Floats, largest: Floats, winner: Ints
+def max_messages(
+    first: Ints, neighbour: Ints, sent: Floats, edge_features: Floats, weight: Floats, maximum: Floats, winner: Ints
 ) -> None:
-    """Write the largest message of each node, max over its edges e of sent[neighbour[e]] + along[e] weight.
+    """Compute the maximum over the edges e of each node of sent[neighbour[e]] + edge_features[e] weight, per channel.
 
     Parameters
     ----------
     first
-        First edge of each node (V + 1,).
+        First edge of each node (V + 1,), the row pointers of compressed rows.
     neighbour
         Node at the other end of each edge (E,).
     sent
-        What each node sends (V, C).
-    along
-        Values of the edges (E, K).
+        Message of each node (V, C).
+    edge_features
+        Features of the edges (E, K).
     weight
-        What these add to each channel (K, C).
-    largest
-        Room for the result (V, C); 0 for a node without an edge.
+        Linear map of the edge features to the channels (K, C).
+    maximum
+        Output (V, C); 0 for a node without edges.
     winner
-        Room for the edge that it comes from (V, C); -1 for a node without an edge.
+        Output (V, C): edge of the maximum; -1 for a node without edges.
     """
     channels = sent.shape[1]
     message = np.empty(channels, dtype=np.float32)
     for i in range(len(first) - 1):
         for c in range(channels):
-            largest[i, c] = 0.0
+            maximum[i, c] = 0.0
             winner[i, c] = -1
         for e in range(first[i], first[i + 1]):
             j = neighbour[e]
             for c in range(channels):
                 message[c] = sent[j, c]
-            for k in range(along.shape[1]):
-                value = along[e, k]
+            for k in range(edge_features.shape[1]):
+                value = edge_features[e, k]
                 for c in range(channels):
                     message[c] += value * weight[k, c]
             for c in range(channels):
-                if winner[i, c] < 0 or message[c] > largest[i, c]:
-                    largest[i, c] = message[c]
+                if winner[i, c] < 0 or message[c] > maximum[i, c]:
+                    maximum[i, c] = message[c]
                     winner[i, c] = e
 
 
 @kernel
-def spread_back(
+def max_messages_gradient(
     neighbour: Ints,
-    along: Floats,
+    edge_features: Floats,
     weight: Floats,
     winner: Ints,
     gradient: Floats,
     to_sent: Floats,
-    to_along: Floats,
+    to_edges: Floats,
     to_weight: Floats,
 ) -> None:
-    """Add the derivatives of :func:`largest_messages` to ``to_sent`` (V, C), ``to_along`` (E, K), ``to_weight`` (K, C).
+    """Add the gradient of :func:`max_messages` to ``to_sent`` (V, C), ``to_edges`` (E, K) and ``to_weight`` (K, C).
 
     Parameters
     ----------
-    neighbour, along, weight, winner
-        As there.
+    neighbour, edge_features, weight, winner
+        As in :func:`max_messages`.
     gradient
-        Of the result (V, C).
+        Derivative with respect to the maximum (V, C).
     """
     for i in range(winner.shape[0]):
         for c in range(winner.shape[1]):
@@ -80,38 +80,45 @@ def spread_back(
             if e >= 0:
                 g = gradient[i, c]
                 to_sent[neighbour[e], c] += g
-                for k in range(along.shape[1]):
-                    to_weight[k, c] += g * along[e, k]
-                    to_along[e, k] += g * weight[k, c]
+                for k in range(edge_features.shape[1]):
+                    to_weight[k, c] += g * edge_features[e, k]
+                    to_edges[e, k] += g * weight[k, c]
 
 
 @inlined
-def _write_message(own: Floats, sent: Floats, along: Floats, weight: Floats, message: Floats) -> None:
-    """Write own + sent + along weight, from rows (C,), (C,), (K,) and weights (K, C)."""
+def _write_message(own: Floats, sent: Floats, edge_features: Floats, weight: Floats, message: Floats) -> None:
+    """Compute own + sent + edge_features weight from rows (C,), (C,), (K,) and weights (K, C)."""
     for c in range(len(message)):
         message[c] = own[c] + sent[c]
-    for k in range(len(along)):
-        value = along[k]
+    for k in range(len(edge_features)):
+        value = edge_features[k]
         for c in range(len(message)):
             message[c] += value * weight[k, c]
 
 
 @allocating
 def mean_messages(
-    first: Ints, neighbour: Ints, own: Floats, sent: Floats, along: Floats, weight: Floats, slope: float, mean: Floats
+    first: Ints,
+    neighbour: Ints,
+    own: Floats,
+    sent: Floats,
+    edge_features: Floats,
+    weight: Floats,
+    slope: float,
+    mean: Floats,
 ) -> None:
-    """Write the mean over the edges e of each node i of leaky(own[i] + sent[neighbour[e]] + along[e] weight).
+    """Compute the mean over the edges e of node i of leaky(own[i] + sent[neighbour[e]] + edge_features[e] weight).
 
     Parameters
     ----------
-    first, neighbour, sent, along, weight
-        As in :func:`largest_messages`.
+    first, neighbour, sent, edge_features, weight
+        As in :func:`max_messages`.
     own
-        What each node adds to the messages that it gets (V, C).
+        Term of the receiving node (V, C).
     slope
-        Of the leaky rectifier below zero.
+        Slope of the leaky rectifier below zero.
     mean
-        Room for the result (V, C); 0 for a node without an edge.
+        Output (V, C); 0 for a node without edges.
     """
     channels = sent.shape[1]
     message = np.empty(channels, dtype=np.float32)
@@ -122,18 +129,18 @@ def mean_messages(
         share = np.float32(1.0 / max(first[i + 1] - first[i], 1))
         for e in range(first[i], first[i + 1]):
             j = neighbour[e]
-            _write_message(own[i], sent[j], along[e], weight, message)
+            _write_message(own[i], sent[j], edge_features[e], weight, message)
             for c in range(channels):
                 mean[i, c] += share * max(message[c], below * message[c])
 
 
 @allocating
-def mean_back(
+def mean_messages_gradient(
     first: Ints,
     neighbour: Ints,
     own: Floats,
     sent: Floats,
-    along: Floats,
+    edge_features: Floats,
     weight: Floats,
     slope: float,
     gradient: Floats,
@@ -141,14 +148,14 @@ def mean_back(
     to_sent: Floats,
     to_weight: Floats,
 ) -> None:
-    """Add the derivatives of :func:`mean_messages` to ``to_own`` (V, C), ``to_sent`` (V, C), ``to_weight`` (K, C).
+    """Add the gradient of :func:`mean_messages` to ``to_own`` (V, C), ``to_sent`` (V, C) and ``to_weight`` (K, C).
 
     Parameters
     ----------
-    first, neighbour, own, sent, along, weight, slope
-        As there.
+    first, neighbour, own, sent, edge_features, weight, slope
+        As in :func:`mean_messages`.
     gradient
-        Of the result (V, C).
+        Derivative with respect to the mean (V, C).
     """
     channels = sent.shape[1]
     message = np.empty(channels, dtype=np.float32)
@@ -157,32 +164,32 @@ def mean_back(
         share = np.float32(1.0 / max(first[i + 1] - first[i], 1))
         for e in range(first[i], first[i + 1]):
             j = neighbour[e]
-            _write_message(own[i], sent[j], along[e], weight, message)
+            _write_message(own[i], sent[j], edge_features[e], weight, message)
             for c in range(channels):
                 g = share * gradient[i, c] * (np.float32(1.0) if message[c] > 0.0 else below)
                 message[c] = g
                 to_own[i, c] += g
                 to_sent[j, c] += g
-            for k in range(along.shape[1]):
-                value = along[e, k]
+            for k in range(edge_features.shape[1]):
+                value = edge_features[e, k]
                 for c in range(channels):
                     to_weight[k, c] += value * message[c]
 
 
 @summing
-def value_distances(first: Ints, neighbour: Ints, values: Floats, softening: float, distance: Floats) -> None:
-    """Write the distance between the values of the ends of each edge, sqrt(|values[j] - values[i]|^2 + softening).
+def feature_distances(first: Ints, neighbour: Ints, values: Floats, softening: float, distance: Floats) -> None:
+    """Compute sqrt(|values[j] - values[i]|^2 + softening) for each edge from i to j.
 
     Parameters
     ----------
     first, neighbour
-        As in :func:`largest_messages`.
+        As in :func:`max_messages`.
     values
-        Of the nodes (V, C).
+        Features of the nodes (V, C).
     softening
-        Positive, so that there is a derivative where values are equal.
+        Positive number that keeps the distance differentiable where the features are equal.
     distance
-        Room for the result (E,).
+        Output (E,).
     """
     for i in range(len(first) - 1):
         for e in range(first[i], first[i + 1]):
@@ -195,17 +202,17 @@ def value_distances(first: Ints, neighbour: Ints, values: Floats, softening: flo
 
 
 @kernel
-def distances_back(
+def feature_distances_gradient(
     first: Ints, neighbour: Ints, values: Floats, distance: Floats, gradient: Floats, to_values: Floats
 ) -> None:
-    """Add the derivatives of :func:`value_distances` to ``to_values`` (V, C).
+    """Add the gradient of :func:`feature_distances` to ``to_values`` (V, C).
 
     Parameters
     ----------
     first, neighbour, values, distance
-        As there.
+        As in :func:`feature_distances`.
     gradient
-        Of the distances (E,).
+        Derivative with respect to the distances (E,).
     """
     for i in range(len(first) - 1):
         for e in range(first[i], first[i + 1]):

@@ -4,7 +4,16 @@ from __future__ import annotations
 
 from pathlib import Path
 
-from anisomesh._kernels import diagram, integrate, intersections, local_step, messages, neighbours, orientation, pyramid
+from anisomesh._kernels import (
+    diagram,
+    graph_hierarchy,
+    integrate,
+    intersections,
+    local_step,
+    messages,
+    neighbours,
+    orientation,
+)
 
 _REMESH = (
     integrate.integrate_chunk,
@@ -20,20 +29,20 @@ _REMESH = (
 )
 _NETWORK = (
     messages.mean_messages,
-    pyramid.independent_set,
-    pyramid.edge_geometry,
-    pyramid.fit_directions,
-    pyramid.spread_at_nodes,
-    pyramid.edge_invariants,
-    pyramid.carry_to_points,
+    graph_hierarchy.maximal_independent_set,
+    graph_hierarchy.edge_geometry,
+    graph_hierarchy.fit_normal_curvature,
+    graph_hierarchy.edge_statistics,
+    graph_hierarchy.edge_features,
+    graph_hierarchy.transport_to_points,
 )
 _TRAIN = (
     *_NETWORK,
-    messages.mean_back,
-    messages.largest_messages,
-    messages.spread_back,
-    messages.value_distances,
-    messages.distances_back,
+    messages.mean_messages_gradient,
+    messages.max_messages,
+    messages.max_messages_gradient,
+    messages.feature_distances,
+    messages.feature_distances_gradient,
 )
 _EVALUATE = (orientation.choose_axes, intersections.sort_into_tree, intersections.find_pairs)
 ENTRY_POINTS = {"remesh": _REMESH, "evaluate": _EVALUATE, "network": _NETWORK, "train": _TRAIN}

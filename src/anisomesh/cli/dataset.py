@@ -58,17 +58,19 @@ def build_command(
     quiet: Annotated[bool, typer.Option("--quiet", "-q", help="No progress.")] = False,
 ) -> None:
     """Build a data set from the meshes in SRC. A stopped build is resumed by the same command."""
-    from anisomesh.learn.data.build import build, sources_of
+    from anisomesh.learn.data.build import build
+    from anisomesh.learn.data.sources import sources_of
+    from anisomesh.pipeline import remesh
 
     if no_variants and variant:
         raise typer.BadParameter("give either --variant or --no-variants")
     variants = () if no_variants else tuple(kind for kind in VARIANTS if kind in (variant or VARIANTS))
     recipe = Recipe(target=target, variants=variants, evening=evening)
-    sources = sources_of(source, blobs, parts)
+    sources = sources_of(source, blobs, parts, validation=validation)
     with progress(quiet) as display:
         announce_compilation(display, "remesh")
     on_row = _ignore if quiet else _print
-    rows = build(sources, out, recipe, validation=validation, workers=workers, on_row=on_row)
+    rows = build(sources, out, recipe, remesh, workers=workers, on_row=on_row)
     typer.echo(_summary(rows))
 
 

@@ -1,4 +1,9 @@
-"""Learning the metric: items, graphs, the network, its training. Only modules of this package import torch."""
+"""Networks that predict the metric of a mesh and remove its noise, and their training.
+
+:mod:`.inference` applies networks, pretrained ones among them; :mod:`.models` has the networks, :mod:`.data` the data
+sets and :mod:`.training` the training; ``weights`` has the pretrained networks. Only modules of this package import
+torch, and this one does not.
+"""
 
 import importlib.util
 
@@ -6,16 +11,22 @@ from anisomesh.errors import AnisomeshError
 
 
 class LearningError(AnisomeshError):
-    """What learning needs is not installed."""
+    """A package that networks need is not installed."""
 
 
 def torch_is_there() -> bool:
-    """Return whether what a trained network needs is installed, without loading it."""
+    """Return whether torch and safetensors are installed, without importing them."""
     return all(importlib.util.find_spec(name) is not None for name in ("torch", "safetensors"))
 
 
 def require_torch() -> None:
-    """Raise LearningError if torch or safetensors is not installed; the message names the extra."""
+    """Import torch and safetensors.
+
+    Raises
+    ------
+    LearningError
+        If one of them is not installed; the message names the extra to install.
+    """
     try:
         import safetensors  # noqa: F401
         import torch  # noqa: F401

@@ -1,4 +1,4 @@
-"""Training examples: items with noise, as pyramids, with the lines and offsets that a network is to find on them."""
+"""Training examples of the default network: items with noise as graph hierarchies, and the targets on them."""
 
 from __future__ import annotations
 
@@ -9,39 +9,39 @@ import torch
 from torch import Tensor
 
 from anisomesh.learn.data.items import Item
-from anisomesh.learn.models.hierarchy import Pyramid, pyramid
+from anisomesh.learn.models.hierarchy import GraphHierarchy, graph_hierarchy
 from anisomesh.mesh.geometry import sums_at_points
 from anisomesh.mesh.noise import Noise, with_noise
 from anisomesh.metric.line_field import line_field_components, principal_stretch
 
-_UNTRUSTED = 0.1  # weight of points whose curvature is not known well
+_UNTRUSTED_WEIGHT = 0.1  # heuristic: weight, over the area, of points whose measured curvature is not reliable
 
 
 @dataclass(frozen=True, eq=False)
-class Example:
-    """A mesh as the network sees it, and what is wanted of it.
+class StretchExample:
+    """Input and targets of the default network for a mesh of N points and E edges.
 
     Attributes
     ----------
-    pyramid
-        Graphs of the mesh of N points and E edges.
-    lines
-        Lines of the clean shape (N, 2).
+    hierarchy
+        The input.
+    line_field
+        Line field of the clean shape, in the tangent frames of the input (N, 2).
     offsets
-        To the points of the clean shape (N, 3), in mean edge lengths.
+        Vectors to the points of the clean shape (N, 3), in mean edge lengths.
     quadrics
-        Mean n n^t over the normals of the clean triangles at each point (N, 3, 3): along the others an offset does not
-        matter.
+        Mean n n^t over the normals of the clean triangles at each point (N, 3, 3); errors of an offset in other
+        directions do not count.
     edges
-        Edges (E, 2).
+        Edges (E, 2), each once.
     weight
-        Of the points (N,), sum 1.
+        Weights of the points (N,), with sum 1.
     unit
         Mean edge length of the clean mesh.
     """
 
-    pyramid: Pyramid
-    lines: Tensor
+    hierarchy: GraphHierarchy
+    line_field: Tensor
     offsets: Tensor
     quadrics: Tensor
     edges: Tensor
@@ -49,41 +49,41 @@ class Example:
     unit: float
 
 
-def example_of(
+def stretch_example(
     item: Item,
-    n_scales: int,
+    n_levels: int,
     noise: float = 0.0,
     rng: np.random.Generator | None = None,
     kind: Noise = "independent",
-) -> Example:
-    """Return an example.
+) -> StretchExample:
+    """Return the example of an item.
 
     Parameters
     ----------
     item
         The mesh and the metric of its clean shape.
-    n_scales
-        Graphs of the pyramid.
+    n_levels
+        Number of levels of the graph hierarchy.
     noise
-        Its deviation, in mean edge lengths. What is wanted is still that of the clean shape.
+        Standard deviation of noise on the input, in mean edge lengths; the targets are of the clean shape.
     rng
-        Of the noise.
+        Random numbers of the noise; None for none.
     kind
         See :func:`anisomesh.mesh.noise.with_noise`.
     """
     clean = item.surface
     noisy = clean if rng is None else with_noise(clean, noise, rng, kind)
-    directions, logarithms = principal_stretch(item.tensors)
-    scales = pyramid(noisy, n_scales)
+    hierarchy = graph_hierarchy(noisy, n_levels)
+    line_field = line_field_components(*principal_stretch(item.tensors), hierarchy.frames)
     area = sums_at_points(clean.face_areas, clean.faces, clean.n_points)
     normals = clean.face_normals
     products = clean.face_areas[:, None, None] * normals[:, :, None] * normals[:, None, :]
     quadrics = sums_at_points(products, clean.faces, clean.n_points)
-    weight = area * np.where(item.trusted, 1.0, _UNTRUSTED)
+    weight = area * np.where(item.trusted, 1.0, _UNTRUSTED_WEIGHT)
     unit = float(clean.edge_lengths.mean())
-    return Example(
-        pyramid=scales,
-        lines=torch.from_numpy(line_field_components(directions, logarithms, scales.frames)),
+    return StretchExample(
+        hierarchy=hierarchy,
+        line_field=torch.from_numpy(line_field),
         offsets=torch.from_numpy(((clean.points - noisy.points) / unit).astype(np.float32)),
         quadrics=torch.from_numpy((quadrics / np.maximum(area, 1e-30)[:, None, None]).astype(np.float32)),
         edges=torch.from_numpy(clean.edges.astype(np.int64)),

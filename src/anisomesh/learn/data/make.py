@@ -31,7 +31,7 @@ from anisomesh.shapes.implicit import Blobs
 
 # Shares and limits below are heuristic, chosen on training meshes.
 _EQUILATERAL_THICKNESS = 0.4330127  # sqrt(3) / 4, area over squared longest side
-_EVEN_COUNT_RANGE = (0.6, 1.6)  # of the target: point counts of meshes that are used as they are
+_EVEN_COUNT_RANGE = (0.6, 1.6)  # of the target: point counts of meshes that are used unchanged
 _MIN_EVEN_REGULARITY = 0.7  # mean thickness over the equilateral one of such meshes
 _DECIMATED_RANGE, _STRETCHED_RANGE = (0.35, 0.75), (0.5, 1.0)  # of the points of the even mesh: sizes of variants
 _MIN_INPUT_REGULARITY = 0.5  # mean thickness over the equilateral one of input meshes whose own metric is an item
@@ -83,8 +83,8 @@ def items_of_mesh(surface: Surface, recipe: Recipe, rng: np.random.Generator, re
 
     Notes
     -----
-    The target of a variant is the metric of the even mesh at the closest point, so that a network learns to see on a
-    bad triangulation what a good one shows. The target of the input mesh is its own metric, which depends on its
+    The target of a variant is the metric of the even mesh at the closest point, so that a network learns the same on a
+    bad triangulation as on a good one. The target of the input mesh is its own metric, which depends on its
     triangles because curvature is fitted over rings of edges.
     """
     prepared = prepare(surface).surface

@@ -1,4 +1,4 @@
-"""The list of what is in a data set: one row a source, as JSON lines."""
+"""The manifest of a data set: one row per source, as JSON lines."""
 
 from __future__ import annotations
 
@@ -12,23 +12,24 @@ from anisomesh.errors import MeshFileError
 MANIFEST = "manifest.jsonl"
 
 ManifestRow = dict[str, Any]
+"""What became of a source, see :func:`anisomesh.learn.data.build.build`."""
 
 
 @dataclass(frozen=True)
-class Files:
-    """Items of a data set for training and for validation."""
+class ItemFiles:
+    """Files of the items for training and for validation."""
 
     training: list[Path]
     validation: list[Path]
 
 
 def read_manifest(folder: Path) -> list[ManifestRow]:
-    """Return the rows of a data set, the last one of each source; none if there is no list.
+    """Return the last row of each source of a data set; none if there is no manifest.
 
     Raises
     ------
     MeshFileError
-        If a line but the last is no row. (The last may have been cut off when a build was killed.)
+        If a line is not a row. The last line may be, as a killed build cuts it off.
     """
     path = folder / MANIFEST
     lines = path.read_text(encoding="utf-8").split("\n") if path.exists() else []
@@ -42,17 +43,17 @@ def read_manifest(folder: Path) -> list[ManifestRow]:
         except (json.JSONDecodeError, KeyError, TypeError) as error:
             if number == len(lines):
                 break
-            raise MeshFileError(f"{path}, line {number}: no row of a data set; move the file away") from error
+            raise MeshFileError(f"{path}, line {number}: not a row of a manifest; move the file away") from error
     return list(rows.values())
 
 
-def files_of(folder: Path) -> Files:
-    """Return the items of a data set, in the order of their names, whatever order they were made in.
+def files_of(folder: Path) -> ItemFiles:
+    """Return the item files of a data set, sorted by name.
 
     Raises
     ------
     MeshFileError
-        If there is no data set.
+        If there is no data set in the folder.
     """
     rows = [row for row in read_manifest(folder) if row["status"] == "kept"]
     if not rows:
@@ -62,4 +63,4 @@ def files_of(folder: Path) -> Files:
     found: dict[str, list[Path]] = {"training": [], "validation": []}
     for row in rows:
         found[row["split"]] += [folder / item["file"] for item in row["items"]]
-    return Files(training=sorted(found["training"]), validation=sorted(found["validation"]))
+    return ItemFiles(training=sorted(found["training"]), validation=sorted(found["validation"]))

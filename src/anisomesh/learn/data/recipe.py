@@ -20,20 +20,20 @@ class Recipe:
     Attributes
     ----------
     target
-        Points that the even mesh of a shape has, about.
+        Approximate number of points of the even mesh of a shape.
     variants
-        Other meshes of every shape: ``"given"`` (the one that it came with, as a remesh works on it, if its triangles
-        are good enough), ``"decimated"`` (quadric collapses: irregular triangles) and ``"stretched"`` (triangles
-        stretched in a random direction that has nothing to do with the curvature).
+        Other meshes of each shape: ``"given"``, the input mesh as a remesh works on it, if its triangles are good
+        enough; ``"decimated"``, by quadric edge collapses, with irregular triangles; ``"stretched"``, with triangles
+        stretched in a random direction that is unrelated to the curvature.
     evening
-        How meshes with other numbers of points, or with bad triangles, are made even: ``"cvt"``, our own remesh with a
-        uniform metric, or ``"tetwild"``, the boundary of pytetwild's tetrahedra, as in the paper, and then the same.
+        How an input mesh is made even unless it is: ``"cvt"``, a remesh with the uniform metric, or ``"tetwild"``, the
+        same on the boundary of pytetwild's tetrahedral mesh (the preparation of the paper).
     max_residual
         Largest relative residual of the direct embedding.
     min_stretch
-        Least mean stretch; shapes below it are flat or round everywhere.
+        Least mean stretch; shapes with less are flat or round everywhere.
     iterations
-        Steps of the direct embedding.
+        Iterations of the direct embedding.
     """
 
     target: int = 5_000

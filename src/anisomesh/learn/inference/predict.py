@@ -1,4 +1,4 @@
-"""What a trained network makes of a surface: its metric or embedding, and the surface beneath the noise."""
+"""Prediction of the metric (or embedding) of a surface by a trained network, and of the surface without noise."""
 
 from __future__ import annotations
 
@@ -16,34 +16,34 @@ from anisomesh._arrays import EmbeddedPoints, Points, PointTensors
 from anisomesh.embedding.precomputed import pulled_back_metric
 from anisomesh.learn.inference.pretrained import weights_path
 from anisomesh.learn.models.checkpoint import Network, load_weights
-from anisomesh.learn.models.device import deterministic, device_of
-from anisomesh.learn.models.hierarchy import pyramid
-from anisomesh.learn.models.paper import PaperNetwork, seen_of
+from anisomesh.learn.models.device import deterministic, resolve_device
+from anisomesh.learn.models.hierarchy import graph_hierarchy
+from anisomesh.learn.models.paper import PaperNetwork, paper_input
 from anisomesh.learn.models.stretch import StretchNetwork
 from anisomesh.mesh.surface import Surface
 from anisomesh.metric.line_field import tensors_of_line_field
 
 NOISE_FLOOR = 0.05
-"""Mean edge lengths; less noise than that is left."""
+"""In mean edge lengths: less noise is not removed. Heuristic; on clean meshes the default network finds less."""
 
-MAX_STEPS = 3
-"""The most times that noise is taken away."""
+MAX_DENOISING_STEPS = 3
+"""Largest number of times that noise is removed; heuristic."""
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Predicted:
-    """What a network predicts for a surface.
+    """Prediction of a network for a surface.
 
     Attributes
     ----------
     tensors
-        The metric (V, 3, 3).
+        Metric (V, 3, 3).
     points
-        The points without noise (V, 3); those of the surface itself where none is taken away.
+        Points without noise (V, 3); the points of the surface if none is removed.
     noise
-        What is taken away: root mean square along the normals of the surface, in mean edge lengths.
+        Removed noise: root mean square along the normals of the surface, in mean edge lengths.
     extra
-        Extra coordinates of the embedding (V, 5), by the paper's network; None by the default one.
+        Coordinates of the embedding beyond the first three (V, 5), from the paper's network; None from the default one.
     """
 
     tensors: PointTensors
@@ -55,69 +55,69 @@ class Predicted:
 def predict(
     surface: Surface, weights: str | os.PathLike[str] | None = None, *, device: str = "cpu", denoise: bool = True
 ) -> Predicted:
-    """Return what a network predicts for a surface at bounding-box diagonal 1.
+    """Return the prediction of a network for a surface at bounding-box diagonal 1.
 
     Parameters
     ----------
     surface
-        The surface; of points without an edge the metric is the identity.
+        The surface. The metric of points without edges is the identity.
     weights
-        A file that training has written, or the name of a shipped network; None for the default one.
+        A file written by training, or the name of a pretrained network; None for the default network.
     device
-        Where the network runs, as torch names it.
+        Torch device of the network.
     denoise
-        Whether noise that the network finds is taken away before its metric is asked for.
+        Whether noise found by the default network is removed before its metric is predicted.
 
     Raises
     ------
     WeightsError
-        If the file cannot be read.
+        If the file cannot be read as weights.
     OptionError
         If there is no such file or device.
     MemoryError
-        If there is too little memory, on the device or beside it.
+        If there is too little memory on the device or the host.
 
     Notes
     -----
-    A surface on which the network finds less noise than ``NOISE_FLOOR`` stays as it is. Otherwise the network is asked
-    again on the surface without it, which it sees better, until it finds no more, three times at most.
+    A surface on which the network finds less noise than ``NOISE_FLOOR`` is not changed. Otherwise the network is
+    applied again to the surface without the noise, at most ``MAX_DENOISING_STEPS`` times.
     """
     path = weights_path(weights).resolve()
-    network = _loaded(path, path.stat().st_mtime_ns, device_of(device))
+    network = _load_cached(path, path.stat().st_mtime_ns, resolve_device(device))
     with torch.inference_mode(), _one_thread(), deterministic():
         try:
             if isinstance(network, StretchNetwork):
-                return _stretch(network, surface, denoise=denoise)
-            return _extra(network, surface)
-        except RuntimeError as error:  # of torch, which has no error of its own for the memory of the CPU
+                return _predict_stretch(network, surface, denoise=denoise)
+            return _predict_embedding(network, surface)
+        except RuntimeError as error:  # torch has no error type for host memory
             if isinstance(error, torch.OutOfMemoryError) or "allocate memory" in str(error):
                 raise MemoryError(str(error)) from error
             raise
 
 
-def _stretch(network: StretchNetwork, surface: Surface, *, denoise: bool) -> Predicted:
-    """Return the metric where no noise is found, and else that of the surface without it, after up to three steps."""
+def _predict_stretch(network: StretchNetwork, surface: Surface, *, denoise: bool) -> Predicted:
+    """Return the metric of the surface, or of the surface without noise after up to three steps if there is some."""
     current = surface
-    for step in range(1 + MAX_STEPS):
-        seen = pyramid(current, network.options.scales)
-        found = network(seen)
+    for step in range(1 + MAX_DENOISING_STEPS):
+        hierarchy = graph_hierarchy(current, network.options.scales)
+        found = network(hierarchy)
         offsets = found.offsets.cpu().numpy().astype(np.float64)
-        if not denoise or step == MAX_STEPS or _height(current, offsets) < NOISE_FLOOR:
+        if not denoise or step == MAX_DENOISING_STEPS or _rms_height(current, offsets) < NOISE_FLOOR:
             break
         current = current.with_points(current.points + offsets)
     return Predicted(
-        tensors=tensors_of_line_field(found.lines.cpu().numpy(), seen.frames),
+        tensors=tensors_of_line_field(found.line_field.cpu().numpy(), hierarchy.frames),
         points=current.points,
-        noise=_height(surface, current.points - surface.points),
+        noise=_rms_height(surface, current.points - surface.points),
     )
 
 
-def _extra(network: PaperNetwork, surface: Surface) -> Predicted:
-    extra = network(seen_of(surface)).cpu().numpy().astype(np.float64)
+def _predict_embedding(network: PaperNetwork, surface: Surface) -> Predicted:
+    extra = network(paper_input(surface)).cpu().numpy().astype(np.float64)
     return Predicted(tensors=pulled_back_metric(surface, extra), points=surface.points, extra=extra)
 
 
-def _height(surface: Surface, offsets: Points) -> float:
+def _rms_height(surface: Surface, offsets: Points) -> float:
     """Return the root mean square of the offsets (V, 3) along the normals, in mean edge lengths."""
     heights = np.einsum("nx,nx->n", surface.point_normals, offsets)
     return float(np.sqrt((heights**2).mean()) / surface.edge_lengths.mean())
@@ -125,7 +125,7 @@ def _height(surface: Surface, offsets: Points) -> float:
 
 @contextmanager
 def _one_thread() -> Iterator[None]:
-    """Have torch take sums in the same order on every machine until the end of the block."""
+    """Use one thread of torch within the block, so that sums have the same order on every machine."""
     before = torch.get_num_threads()
     torch.set_num_threads(1)
     try:
@@ -135,6 +135,6 @@ def _one_thread() -> Iterator[None]:
 
 
 @lru_cache(maxsize=4)
-def _loaded(path: Path, changed: int, device: torch.device) -> Network:
-    """Return the network in a file, read again when the file has changed."""
+def _load_cached(path: Path, changed: int, device: torch.device) -> Network:
+    """Return the network in a file; ``changed``, its time of modification, invalidates the cache."""
     return load_weights(path)[0].to(device).eval()

@@ -1,4 +1,4 @@
-"""Trained networks that come with the package, and how they were trained."""
+"""Pretrained networks of the package, and the configurations of their training."""
 
 from __future__ import annotations
 
@@ -8,38 +8,38 @@ from pathlib import Path
 from anisomesh.errors import OptionError
 from anisomesh.toml import hint
 
-DEFAULT = "default"
-_FOLDER = Path(__file__).parents[1] / "weights"
+DEFAULT_NETWORK = "default"
+_WEIGHTS_FOLDER = Path(__file__).parents[1] / "weights"
 
 
-def shipped_weights() -> list[str]:
-    """Return the names of the networks that come with the package."""
-    return sorted(path.stem for path in _FOLDER.glob("*.safetensors"))
+def pretrained_networks() -> list[str]:
+    """Return the names of the pretrained networks."""
+    return sorted(path.stem for path in _WEIGHTS_FOLDER.glob("*.safetensors"))
 
 
-def configurations() -> list[str]:
-    """Return the names of the trainings that made them."""
-    return sorted(path.stem for path in _FOLDER.glob("*.toml"))
+def pretrained_configurations() -> list[str]:
+    """Return the names of the training configurations of the pretrained networks."""
+    return sorted(path.stem for path in _WEIGHTS_FOLDER.glob("*.toml"))
 
 
 def configuration_path(name: str) -> Path:
-    """Return the file of a training by its name."""
-    return _FOLDER / f"{name}.toml"
+    """Return the TOML file of a training configuration by its name."""
+    return _WEIGHTS_FOLDER / f"{name}.toml"
 
 
 def weights_path(weights: str | os.PathLike[str] | None) -> Path:
-    """Return the file of weights: of a shipped network by its name, of the default one for None, or the file named.
+    """Return the file of weights for the name of a pretrained network, a path, or None for the default network.
 
     Raises
     ------
     OptionError
         If there is no such file.
     """
-    name = DEFAULT if weights is None else os.fspath(weights)
-    path = _FOLDER / f"{name}.safetensors" if name in shipped_weights() else Path(name)
+    name = DEFAULT_NETWORK if weights is None else os.fspath(weights)
+    known = pretrained_networks()
+    path = _WEIGHTS_FOLDER / f"{name}.safetensors" if name in known else Path(name)
     if not path.is_file():
-        known = shipped_weights()
         raise OptionError(
-            f"{name}: no file of weights, and no network of the package ({', '.join(known)}){hint(name, known)}"
+            f"{name} is neither a file of weights nor a pretrained network ({', '.join(known)}){hint(name, known)}"
         )
     return path

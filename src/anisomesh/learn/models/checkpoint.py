@@ -1,4 +1,4 @@
-"""Weights and the state of a training run on disk: safetensors and JSON, each written in full or not at all."""
+"""Files of weights and checkpoints: safetensors with JSON in the header, written atomically; nothing is unpickled."""
 
 from __future__ import annotations
 
@@ -19,51 +19,51 @@ from anisomesh.learn.models.stretch import NetworkOptions, StretchNetwork
 
 
 class WeightsError(AnisomeshError):
-    """A file of weights or a checkpoint cannot be read, or belongs to another network."""
+    """A file of weights or a checkpoint cannot be read, or is of another network."""
 
 
-KINDS: dict[str, tuple[Any, Any]] = {
+NETWORK_KINDS: dict[str, tuple[Any, Any]] = {
     "default": (StretchNetwork, NetworkOptions),
     "paper": (PaperNetwork, PaperOptions),
 }
-"""Networks and their sizes, by the name that files have for them."""
+"""Class of the network and of its options for each kind in a file of weights."""
 
 Network = StretchNetwork | PaperNetwork
 
 
 def save_weights(network: Network, path: Path, facts: dict[str, Any]) -> None:
-    """Write the weights of a network, its sizes, and facts about it, in one file of safetensors.
+    """Write the weights of a network, its options, and facts about it (as JSON) to one safetensors file.
 
     Raises
     ------
     MeshFileError
         If the file cannot be written.
     """
-    kind = next(name for name, (made, _) in KINDS.items() if isinstance(network, made))
-    head = {"kind": kind, "network": json.dumps(asdict(network.options)), "facts": json.dumps(facts)}
-    _write(path, save({name: value.contiguous() for name, value in network.state_dict().items()}, metadata=head))
+    kind = next(name for name, (network_class, _) in NETWORK_KINDS.items() if isinstance(network, network_class))
+    header = {"kind": kind, "network": json.dumps(asdict(network.options)), "facts": json.dumps(facts)}
+    _write(path, save({name: value.contiguous() for name, value in network.state_dict().items()}, metadata=header))
 
 
 def load_weights(path: Path) -> tuple[Network, dict[str, Any]]:
-    """Return the network in a file, and the facts about it.
+    """Return the network in a file of weights, and the facts about it.
 
     Raises
     ------
     WeightsError
-        If the file is missing, damaged or of another kind.
+        If the file is missing, damaged, or has no weights of a known network.
     """
-    tensors, head = _read(path)
+    tensors, header = _read(path)
     try:
-        made, sizes = KINDS[head["kind"]]
-        network: Network = made(sizes(**json.loads(head["network"])))
+        network_class, options_class = NETWORK_KINDS[header["kind"]]
+        network: Network = network_class(options_class(**json.loads(header["network"])))
         network.load_state_dict(tensors)
-        return network, json.loads(head["facts"])
+        return network, json.loads(header["facts"])
     except (KeyError, TypeError, RuntimeError, json.JSONDecodeError) as error:
-        raise WeightsError(f"{path}: no weights of this network: {error}") from error
+        raise WeightsError(f"{path}: does not hold the weights of a known network: {error}") from error
 
 
 def save_state(path: Path, network: nn.Module, optimiser: torch.optim.Optimizer, state: dict[str, Any]) -> None:
-    """Write all that a training run needs to go on: weights, the moments of the optimiser, and numbers of its own.
+    """Write a checkpoint: the weights, the moments of the optimiser, and the state of the run (as JSON).
 
     Raises
     ------
@@ -72,20 +72,20 @@ def save_state(path: Path, network: nn.Module, optimiser: torch.optim.Optimizer,
     """
     tensors = {f"weights.{name}": value.contiguous() for name, value in network.state_dict().items()}
     names = [name for name, _ in network.named_parameters()]
-    for number, values in optimiser.state_dict()["state"].items():  # parameters without a gradient have none
+    for number, values in optimiser.state_dict()["state"].items():  # parameters without a gradient have no moments
         tensors |= {f"optimiser.{names[number]}.{key}": value.contiguous() for key, value in values.items()}
     _write(path, save(tensors, metadata={"state": json.dumps(state)}))
 
 
 def load_state(path: Path, network: nn.Module, optimiser: torch.optim.Optimizer) -> dict[str, Any]:
-    """Bring network and optimiser to the state in a file and return the numbers beside it.
+    """Restore network and optimiser from a checkpoint and return the state of the run.
 
     Raises
     ------
     WeightsError
-        If the file is damaged or of another network.
+        If the file is missing, damaged, or a checkpoint of another network.
     """
-    tensors, head = _read(path)
+    tensors, header = _read(path)
     try:
         weights = {
             name.removeprefix("weights."): value for name, value in tensors.items() if name.startswith("weights.")
@@ -101,10 +101,10 @@ def load_state(path: Path, network: nn.Module, optimiser: torch.optim.Optimizer)
             if values:
                 table["state"][number] = values
         optimiser.load_state_dict(table)
-        state: dict[str, Any] = json.loads(head["state"])
+        state: dict[str, Any] = json.loads(header["state"])
         return state
     except (KeyError, RuntimeError, ValueError) as error:
-        raise WeightsError(f"{path}: no checkpoint of this run: {error}") from error
+        raise WeightsError(f"{path}: does not hold a checkpoint of this run: {error}") from error
 
 
 def _write(path: Path, data: bytes) -> None:
@@ -116,7 +116,7 @@ def _read(path: Path) -> tuple[dict[str, Tensor], dict[str, str]]:
     try:
         data = path.read_bytes()
         length = int.from_bytes(data[:8], "little")
-        head = json.loads(data[8 : 8 + length]).get("__metadata__", {})
-        return load(data), head
+        header = json.loads(data[8 : 8 + length]).get("__metadata__", {})
+        return load(data), header
     except (OSError, ValueError, AttributeError, SafetensorError) as error:
         raise WeightsError(f"{path}: cannot be read as safetensors: {error}") from error

@@ -1,4 +1,4 @@
-"""Where networks run."""
+"""Devices of torch, and reproducible sums on them."""
 
 from __future__ import annotations
 
@@ -10,20 +10,21 @@ import torch
 from anisomesh.errors import OptionError
 
 
-def device_of(name: str, rank: int = 0) -> torch.device:
-    """Return the device of this name.
+def resolve_device(name: str, rank: int = 0) -> torch.device:
+    """Return the device of a name.
 
     Parameters
     ----------
     name
-        As torch names it; ``"cuda"`` is a GPU for each process, ``"auto"`` the same where there is one, else the CPU.
+        A torch device. ``"cuda"`` gives each process a GPU of its own as far as there are enough; ``"auto"`` does so
+        where there is a GPU, and is the CPU elsewhere.
     rank
-        Number of the process on this machine.
+        Rank of this process on this machine.
 
     Raises
     ------
     OptionError
-        If there is no such device.
+        If the device does not exist or cannot be used.
     """
     if name in ("auto", "cuda"):
         count = torch.cuda.device_count() if torch.cuda.is_available() else 0
@@ -39,9 +40,9 @@ def device_of(name: str, rank: int = 0) -> torch.device:
 
 @contextmanager
 def deterministic() -> Iterator[None]:
-    """Have torch take sums in the same order every time, for any number of threads, until the end of the block.
+    """Use deterministic torch algorithms within the block, so that results are reproducible for any number of threads.
 
-    On a GPU it warns where it cannot.
+    On a GPU torch warns about operations without such an algorithm.
     """
     before = torch.are_deterministic_algorithms_enabled()
     torch.use_deterministic_algorithms(True, warn_only=torch.cuda.is_available())

@@ -1,4 +1,4 @@
-"""How a network is trained, from a TOML file."""
+"""Options of a training run, and reading them from a TOML file."""
 
 from __future__ import annotations
 
@@ -7,7 +7,7 @@ from pathlib import Path
 from typing import Any
 
 from anisomesh.errors import OptionError
-from anisomesh.learn.inference.pretrained import configuration_path, configurations, shipped_weights
+from anisomesh.learn.inference.pretrained import configuration_path, pretrained_configurations, pretrained_networks
 from anisomesh.learn.models.paper import PaperOptions
 from anisomesh.learn.models.stretch import NetworkOptions
 from anisomesh.learn.training.losses import LOSSES
@@ -16,37 +16,36 @@ from anisomesh.toml import check_keys, read_toml
 
 @dataclass(frozen=True, kw_only=True)
 class TrainingOptions:
-    """A training run.
+    """Options of a training run; the keys of a configuration file have the same names.
 
     Attributes
     ----------
     data, out
-        Folder of the data set, and of what the run writes.
+        Folders of the data set, and of the files that the run writes.
     start
-        Weights to start from, a file or the name of a shipped network; random ones without.
+        Initial weights: a file, or the name of a pretrained network; random if empty.
     epochs
-        Times that every training item is seen.
+        Number of passes over the training items.
     batch
-        Items whose gradients are averaged for one step.
-    rate, weight_decay, clip
-        Of AdamW: the largest learning rate, reached after ``warmup`` steps and falling to zero along a cosine, the
-        decay of weights, and the norm that gradients are cut to.
-    warmup
-        Steps in which the rate rises.
+        Items per optimisation step.
+    rate, warmup
+        Largest learning rate of AdamW, reached after ``warmup`` steps; then it falls to zero along a cosine.
+    weight_decay, clip
+        Weight decay of AdamW, and the norm that gradients are clipped to.
     noise, noise_share
-        Largest noise that is added to points, in mean edge lengths, and the share of items that get some.
+        Largest standard deviation of noise on the points, in mean edge lengths, and the share of items with noise.
     seed
-        Of the weights, the order of the items and the noise.
+        Seed of the initial weights, the order of the items and the noise.
     minutes
-        Between checkpoints.
+        Time between checkpoints.
     device
-        ``"auto"``: a GPU where there is one, else the CPU; or as torch names it.
+        A torch device, or ``"auto"``: a GPU if there is one, else the CPU.
     network
-        Kind and sizes of the network; in a file the table ``[network]`` has the sizes of the default network, the table
-        ``[paper]`` in its place those of the paper's.
+        Sizes of the default network or of the paper's; table ``[network]`` or ``[paper]`` of a file.
     loss, laplacian, gauge, augment
-        For the paper's network: ``"dot"``, ``"l2"`` or ``"cosine"``; the weight of the Laplacian loss; whether its
-        target is ``"aligned"`` first or taken ``"raw"`` as in the paper; and whether items are mirrored and turned.
+        For the paper's network: loss ``"dot"``, ``"l2"`` or ``"cosine"``; weight of the Laplacian loss; whether the
+        target of that loss is first ``"aligned"`` to the prediction, or used ``"raw"`` as in the paper; and whether
+        items are mirrored and rotated at random.
     """
 
     data: str
@@ -81,56 +80,57 @@ class TrainingOptions:
                 raise OptionError(f"{name} = {getattr(self, name)}; expected a positive number")
         if not (0.0 <= self.noise_share <= 1.0 and min(self.noise, self.weight_decay, self.laplacian) >= 0.0):
             raise OptionError(
-                "noise, weight_decay and laplacian must not be negative, and noise_share be between 0 and 1"
+                "noise, weight_decay and laplacian must not be negative, and noise_share must be between 0 and 1"
             )
 
 
 def load_training(path: str | Path) -> TrainingOptions:
-    """Return the training run that a TOML file describes; its folders are relative to that of the file.
+    """Return the options in a TOML file.
 
-    The name of a training that comes with the package stands for its file, and folders are relative to the current one.
+    Folders are relative to the folder of the file. The name of a configuration of the package can stand for its file;
+    then folders are relative to the current folder.
 
     Raises
     ------
     OptionError
-        If the file cannot be read, or a key is unknown, missing, or has a value of the wrong kind.
+        If the file cannot be read, or a key is unknown, missing, or has a value of the wrong type.
     """
     path, folder = Path(path), Path(path).parent
-    if str(path) in configurations():
+    if str(path) in pretrained_configurations():
         path, folder = configuration_path(str(path)), Path()
     options = parse_training(str(path), read_toml(path))
-    start = options.start if options.start in ("", *shipped_weights()) else str(folder / options.start)
+    start = options.start if options.start in ("", *pretrained_networks()) else str(folder / options.start)
     return replace(options, data=str(folder / options.data), out=str(folder / options.out), start=start)
 
 
 def parse_training(where: str, table: dict[str, Any]) -> TrainingOptions:
-    """Return the training run that a table describes; ``where`` it is from is said in errors.
+    """Return the options in a TOML table; ``where`` names its origin in errors.
 
     Raises
     ------
     OptionError
-        If a key is unknown, missing, or has a value of the wrong kind.
+        If a key is unknown, missing, or has a value of the wrong type.
     """
     if "network" in table and "paper" in table:
-        raise OptionError(f"{where}: give either [network] or [paper]")
-    name, kind = ("paper", PaperOptions) if "paper" in table else ("network", NetworkOptions)
+        raise OptionError(f"{where}: give either [network] or [paper], not both")
+    name, options_class = ("paper", PaperOptions) if "paper" in table else ("network", NetworkOptions)
     rest = {key: value for key, value in table.items() if key != name}
-    sizes = _values(f"{where}: [{name}]", kind, table.get(name, {}))
-    return TrainingOptions(**_values(where, TrainingOptions, rest), network=kind(**sizes))
+    sizes = _checked_values(f"{where}: [{name}]", options_class, table.get(name, {}))
+    return TrainingOptions(**_checked_values(where, TrainingOptions, rest), network=options_class(**sizes))
 
 
-def _values(where: str, kind: type, table: Any) -> dict[str, Any]:
-    """Return the values of a table, checked against the fields of a dataclass."""
+def _checked_values(where: str, options_class: type, table: Any) -> dict[str, Any]:
+    """Return the values of a table after a check of their names and types against the fields of a dataclass."""
     if not isinstance(table, dict):
         raise OptionError(f"{where}: expected a table")
-    known = {entry.name: entry for entry in fields(kind) if entry.name != "network"}
+    known = {entry.name: entry for entry in fields(options_class) if entry.name != "network"}
     check_keys(where, table, known)
     for name, entry in known.items():
         if name not in table and entry.default is MISSING and entry.default_factory is MISSING:
             raise OptionError(f"{where}: {name} is missing")
         if name not in table:
             continue
-        wanted: Any = {"int": int, "float": int | float, "str": str, "bool": bool}[str(entry.type)]
-        if not isinstance(table[name], wanted) or isinstance(table[name], bool) != (wanted is bool):
+        expected: Any = {"int": int, "float": int | float, "str": str, "bool": bool}[str(entry.type)]
+        if not isinstance(table[name], expected) or isinstance(table[name], bool) != (expected is bool):
             raise OptionError(f"{where}: {name} = {table[name]!r}; expected {entry.type}")
     return dict(table)

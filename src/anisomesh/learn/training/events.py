@@ -1,4 +1,4 @@
-"""Measurements of a training run for TensorBoard, where that is installed."""
+"""Log of a training run for TensorBoard, if it is installed."""
 
 from __future__ import annotations
 
@@ -7,15 +7,15 @@ from pathlib import Path
 from typing import Any
 
 
-class Events:
-    """Writes rows of measurements as scalars into a folder that TensorBoard reads; without TensorBoard, nothing."""
+class EventLog:
+    """Log of the rows of a run as scalars, in a folder that TensorBoard reads; without TensorBoard it does nothing."""
 
     def __init__(self, folder: Path) -> None:
         self._folder = folder
         self._writer: Any = None
 
     def add(self, row: dict[str, Any]) -> None:
-        """Write the numbers of a row at its epoch; what an earlier process wrote of later epochs is no longer shown."""
+        """Write the numbers of a row at its epoch; entries of later epochs from an interrupted run are purged."""
         if importlib.util.find_spec("tensorboard") is None:
             return
         if self._writer is None:

@@ -1,4 +1,4 @@
-"""Several processes that train one network, as torchrun starts them; or one that trains alone."""
+"""The processes that train a network together, as torchrun starts them, or a single one."""
 
 from __future__ import annotations
 
@@ -12,12 +12,12 @@ import torch
 import torch.distributed as distributed
 from torch import nn
 
-_PATIENCE = timedelta(days=1)  # the others wait while the first one validates
+_COLLECTIVE_TIMEOUT = timedelta(days=1)  # heuristic: longer than a validation, which the first process does alone
 
 
 @dataclass(frozen=True)
-class Workers:
-    """One process among those that train together: its rank, how many there are, and its rank on this machine."""
+class TrainingProcess:
+    """The calling process: its rank, the number of processes, and its rank on this machine."""
 
     rank: int = 0
     size: int = 1
@@ -25,11 +25,11 @@ class Workers:
 
     @property
     def is_first(self) -> bool:
-        """Whether this is the process that writes files and validates."""
+        """Whether this process validates and writes files."""
         return self.rank == 0
 
     def sum_gradients(self, parameters: Iterable[nn.Parameter]) -> None:
-        """Replace the gradients by their sums over all processes; those that are missing somewhere count as zero."""
+        """Replace the gradients by their sums over all processes; a missing gradient counts as zero."""
         if self.size == 1:
             return
         gradients = []
@@ -39,10 +39,10 @@ class Workers:
             gradients.append(parameter.grad)
         flat = torch.cat([gradient.ravel() for gradient in gradients]).cpu()
         distributed.all_reduce(flat)
-        place = 0
+        start = 0
         for gradient in gradients:
-            gradient.copy_(flat[place : place + gradient.numel()].view_as(gradient))
-            place += gradient.numel()
+            gradient.copy_(flat[start : start + gradient.numel()].view_as(gradient))
+            start += gradient.numel()
 
     def total(self, value: float) -> float:
         """Return the sum of a number over all processes."""
@@ -53,21 +53,21 @@ class Workers:
         return float(summed)
 
     def wait(self) -> None:
-        """Wait until all processes are here."""
+        """Wait until all processes call this."""
         if self.size > 1:
             distributed.barrier()
 
 
 @contextmanager
-def workers() -> Iterator[Workers]:
-    """Yield the processes that torchrun has started together (gloo), or this one alone."""
+def training_process() -> Iterator[TrainingProcess]:
+    """Yield this process, connected by gloo to the others that torchrun has started, if any."""
     size = int(os.environ.get("WORLD_SIZE", "1"))
     if size == 1:
-        yield Workers()
+        yield TrainingProcess()
         return
-    distributed.init_process_group("gloo", timeout=_PATIENCE)
+    distributed.init_process_group("gloo", timeout=_COLLECTIVE_TIMEOUT)
     try:
         local_rank = int(os.environ.get("LOCAL_RANK", "0"))
-        yield Workers(rank=distributed.get_rank(), size=size, local_rank=local_rank)
+        yield TrainingProcess(rank=distributed.get_rank(), size=size, local_rank=local_rank)
     finally:
         distributed.destroy_process_group()
