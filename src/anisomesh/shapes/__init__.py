@@ -1,1 +1,1 @@
-"""Shapes made by code: analytic surfaces, machine parts, lofts, implicit surfaces."""
+"""Procedural shapes: analytic surfaces, CAD parts, lofts, implicit surfaces."""

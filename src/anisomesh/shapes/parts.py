@@ -1,4 +1,4 @@
-"""Sparse CAD parts made by code: prisms, solids of revolution, lofts, and a set of them, with few large triangles."""
+"""Procedural CAD parts of few large triangles: prisms, solids of revolution, lofts."""
 
 from __future__ import annotations
 
@@ -15,12 +15,12 @@ Outline = npt.NDArray[np.float64]
 
 
 def prism(outline: Sequence[Sequence[float]] | Outline, height: float) -> Surface:
-    """Return the prism over a simple polygon (n, 2), counter-clockwise, from z = 0 up, with the fewest triangles.
+    """Return the exact prism over a simple polygon (n, 2), counter-clockwise, from z = 0, with 4 n - 4 triangles.
 
     Raises
     ------
     OptionError
-        If the outline is no such polygon.
+        If the outline is not such a polygon, or the height is not positive.
     """
     corners = np.asarray(outline, dtype=np.float64)
     if corners.ndim != 2 or corners.shape[1] != 2 or len(corners) < 3 or not height > 0.0:
@@ -28,7 +28,7 @@ def prism(outline: Sequence[Sequence[float]] | Outline, height: float) -> Surfac
             f"outline has shape {corners.shape}, height is {height}; expected (n, 2) and a positive height"
         )
     n = len(corners)
-    cap = _triangulated(corners)
+    cap = _triangulate(corners)
     lower, upper = (np.pad(corners, ((0, 0), (0, 1)), constant_values=z) for z in (0.0, height))
     k, after = np.arange(n), np.roll(np.arange(n), -1)
     walls = [np.stack([k, after, after + n], axis=1), np.stack([k, after + n, k + n], axis=1)]
@@ -36,12 +36,14 @@ def prism(outline: Sequence[Sequence[float]] | Outline, height: float) -> Surfac
 
 
 def revolution(profile: Sequence[Sequence[float]] | Outline, n_around: int = 32) -> Surface:
-    """Return the solid of revolution around the z axis of a profile (n, 2) of radii and heights, from axis to axis.
+    """Return the solid of revolution of a profile (n, 2) of radii and heights around the z axis.
+
+    Vertices are on the exact surface; it is a :func:`loft` over a regular polygon of ``n_around`` corners.
 
     Raises
     ------
     OptionError
-        If the profile does not begin and end on the axis, or touches it between.
+        If the profile does not start and end on the axis or touches it in between, or ``n_around`` is below 3.
     """
     if n_around < 3:
         raise OptionError(f"n_around is {n_around}; expected 3 or more")
@@ -49,23 +51,24 @@ def revolution(profile: Sequence[Sequence[float]] | Outline, n_around: int = 32)
 
 
 def loft(outline: Sequence[Sequence[float]] | Outline, profile: Sequence[Sequence[float]] | Outline) -> Surface:
-    """Return the solid whose sections are an outline, as many times larger as a profile says.
+    """Return the solid whose sections are an outline scaled by a profile; its vertices, creases and sides are exact.
 
     Parameters
     ----------
     outline
-        Polygon (m, 2) that goes around the origin counter-clockwise and is seen from it all round.
+        Polygon (m, 2), counter-clockwise and star-shaped around the origin.
     profile
-        Sizes and heights (n, 2), from size 0 to size 0.
+        Scale factors and heights (n, 2); the first and the last factor are 0.
 
     Raises
     ------
     OptionError
-        If the outline is no such polygon, or the profile does not begin and end on the axis, or touches it between.
+        If the outline is not such a polygon, or the profile does not start and end on the axis or touches it in
+        between.
     """
     rim, rows = _checked(outline, profile)
     if rows[0, 0] != 0.0 or rows[-1, 0] != 0.0 or not (rows[1:-1, 0] > 0.0).all():
-        raise OptionError("the profile has to begin and end on the axis (radius 0) and be off it between")
+        raise OptionError("profile must start and end on the axis (radius 0) and have positive radii in between")
     n_around = len(rim)
     rings = _rings(rim, rows[1:-1])
     ends = np.array([[0.0, 0.0, rows[0, 1]], [0.0, 0.0, rows[-1, 1]]])
@@ -81,24 +84,24 @@ def loft(outline: Sequence[Sequence[float]] | Outline, profile: Sequence[Sequenc
 
 
 def hollow_loft(outline: Sequence[Sequence[float]] | Outline, section: Sequence[Sequence[float]] | Outline) -> Surface:
-    """Return a loft with a hole along its axis: the surface of outlines as large and high as a closed polygon says.
+    """Return a loft with a hole along the axis: outlines scaled and raised as a closed polygon prescribes.
 
     Parameters
     ----------
     outline
         As in :func:`loft`.
     section
-        Simple polygon (n, 2) of sizes, which are positive, and heights, counter-clockwise: up outside, down inside.
+        Simple polygon (n, 2) of positive scale factors and heights, counter-clockwise: up outside, down inside.
 
     Raises
     ------
     OptionError
-        If the outline is no such polygon, or the section has a size that is not positive, or is not counter-clockwise.
+        If the outline is not such a polygon, or the section is clockwise or has a factor that is not positive.
     """
     rim, rows = _checked(outline, section)
     after = np.roll(rows, -1, axis=0)
     if not (rows[:, 0] > 0.0).all() or not (rows[:, 0] * after[:, 1] - rows[:, 1] * after[:, 0]).sum() > 0.0:
-        raise OptionError("the section has to be counter-clockwise and off the axis")
+        raise OptionError("section must be counter-clockwise and have positive scale factors")
     wall = patches.grid_faces(len(rows), len(rim), wrap_rows=True, wrap_columns=True)[:, ::-1]
     return Surface(np.concatenate(_rings(rim, rows)), wall.astype(np.int64))
 
@@ -106,22 +109,24 @@ def hollow_loft(outline: Sequence[Sequence[float]] | Outline, section: Sequence[
 def _checked(
     outline: Sequence[Sequence[float]] | Outline, profile: Sequence[Sequence[float]] | Outline
 ) -> tuple[Outline, Outline]:
-    """Return an outline and a profile as arrays of the shapes that a loft needs."""
+    """Return an outline (m, 2) and a profile (n, 2) as arrays, after validation."""
     rim, rows = np.asarray(outline, dtype=np.float64), np.asarray(profile, dtype=np.float64)
-    if rim.ndim != 2 or rim.shape[1] != 2 or len(rim) < 3 or not is_star(rim):
-        raise OptionError(f"outline of shape {rim.shape}; expected (m, 2), counter-clockwise and seen from the origin")
+    if rim.ndim != 2 or rim.shape[1] != 2 or len(rim) < 3 or not is_star_shaped(rim):
+        raise OptionError(
+            f"outline of shape {rim.shape}; expected (m, 2), counter-clockwise and star-shaped around the origin"
+        )
     if rows.ndim != 2 or rows.shape[1] != 2 or len(rows) < 3:
-        raise OptionError(f"profile has shape {rows.shape}; expected (n, 2) from 3")
+        raise OptionError(f"profile has shape {rows.shape}; expected (n, 2) with n of at least 3")
     return rim, rows
 
 
 def _rings(rim: Outline, rows: Outline) -> list[Outline]:
-    """Return the sections (m, 3) of a loft."""
+    """Return the sections (m, 3) of a loft, one for each row of the profile."""
     return [np.pad(size * rim, ((0, 0), (0, 1)), constant_values=z) for size, z in rows]
 
 
-def is_star(outline: Outline) -> bool:
-    """Return whether a polygon (m, 2) goes around the origin once, counter-clockwise, and is seen from it all round."""
+def is_star_shaped(outline: Outline) -> bool:
+    """Return whether a polygon (m, 2) is counter-clockwise and star-shaped around the origin, with one turn."""
     after = np.roll(outline, -1, axis=0)
     cross = outline[:, 0] * after[:, 1] - outline[:, 1] * after[:, 0]
     turn = np.arctan2(cross, np.einsum("nx,nx->n", outline, after))
@@ -129,7 +134,7 @@ def is_star(outline: Outline) -> bool:
 
 
 def sparse_parts() -> dict[str, Surface]:
-    """Return ten CAD parts by name, of 12 to a few hundred triangles, with exact creases and corners."""
+    """Return ten CAD parts by name, of 12 to a few hundred triangles; creases and corners are exact."""
     turn = 2.0 * np.pi * np.arange(24) / 24
     teeth = np.where(np.arange(24) % 4 < 2, 1.0, 0.75)[:, None] * np.stack([np.cos(turn), np.sin(turn)], axis=1)
     hexagon = np.stack([np.cos(turn[::4]), np.sin(turn[::4])], axis=1)
@@ -150,13 +155,13 @@ def sparse_parts() -> dict[str, Surface]:
     }
 
 
-def _triangulated(outline: Outline) -> npt.NDArray[np.int64]:
-    """Return triangles (n - 2, 3) of a simple polygon, by cutting off ears; O(n^3), for a few dozen corners.
+def _triangulate(outline: Outline) -> npt.NDArray[np.int64]:
+    """Return triangles (n - 2, 3) of a simple polygon by ear clipping (Meisters 1975); O(n^3), for a few dozen corners.
 
     Raises
     ------
     OptionError
-        If there is no ear, as in a polygon that is clockwise or crosses itself.
+        If there is no ear: the polygon is clockwise or intersects itself.
     """
     left = list(range(len(outline)))
     triangles = []
@@ -170,11 +175,11 @@ def _triangulated(outline: Outline) -> npt.NDArray[np.int64]:
                 del left[k]
                 break
         else:
-            raise OptionError("the outline is no simple polygon with its corners counter-clockwise")
+            raise OptionError("outline is not a simple, counter-clockwise polygon")
     return np.array(triangles, dtype=np.int64)
 
 
 def _side(a: Outline, b: Outline, point: Outline) -> Outline:
-    """Return twice the signed area of triangles from a segment to points (..., 2); positive on the left."""
+    """Return twice the signed area of the triangles a, b, point (..., 2); positive if a point is left of a b."""
     along, to = b - a, point - a
     return np.asarray(along[0] * to[..., 1] - along[1] * to[..., 0])

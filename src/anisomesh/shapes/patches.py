@@ -1,4 +1,4 @@
-"""Structured pieces from which the exact test shapes are put together."""
+"""Triangulated patches from which procedural shapes are assembled."""
 
 from __future__ import annotations
 
@@ -13,12 +13,13 @@ from anisomesh.mesh.weld import coincident
 
 Patch = tuple[Points, Faces]
 
+_MIN_DISK_LOOP = 6  # points of the smallest loop of a disk around its centre: equilateral triangles
+
 
 def grid_faces(rows: int, columns: int, *, wrap_rows: bool = False, wrap_columns: bool = False) -> Faces:
-    """Return the triangles of a grid of points numbered row by row, two for each cell.
+    """Return the triangles of a grid of points numbered row by row, two per cell.
 
-    A face is counter-clockwise seen from the side from which rows run away to the right and columns upwards,
-    that is its normal is (row direction) x (column direction).
+    Normals have the direction of (from row to row) x (from column to column).
     """
     i, j = np.meshgrid(np.arange(rows - (not wrap_rows)), np.arange(columns - (not wrap_columns)), indexing="ij")
     a = i * columns + j
@@ -29,17 +30,17 @@ def grid_faces(rows: int, columns: int, *, wrap_rows: bool = False, wrap_columns
 
 
 def zip_loops(outer: npt.NDArray[np.float64], inner: npt.NDArray[np.float64]) -> Faces:
-    """Triangulate between two loops around the origin.
+    """Triangulate the strip between two loops around the origin.
 
     Parameters
     ----------
     outer, inner
-        Angles of the points of each loop, increasing, over less than a full turn and starting about equal.
+        Angles of the points of each loop in radians, increasing, over less than a full turn, with about equal start.
 
     Returns
     -------
     ndarray
-        Faces (len(outer) + len(inner), 3), counter-clockwise; inner points are numbered behind the outer ones.
+        Faces (len(outer) + len(inner), 3), counter-clockwise; inner points are numbered after the outer ones.
     """
     n, m = len(outer), len(inner)
     outer_middle = 0.5 * (outer + np.append(outer[1:], outer[0] + 2 * np.pi))
@@ -52,10 +53,10 @@ def zip_loops(outer: npt.NDArray[np.float64], inner: npt.NDArray[np.float64]) ->
     return np.concatenate([from_outer, from_inner]).astype(np.int32)
 
 
-def rings(loops: Sequence[npt.NDArray[np.float64]]) -> Patch:
-    """Return the patch (z = 0, facing up) between loops (n, 2) around the origin, from the outermost inwards.
+def patch_between_loops(loops: Sequence[npt.NDArray[np.float64]]) -> Patch:
+    """Return the patch (z = 0, normals up) between loops (n, 2) around the origin, ordered from the outermost inwards.
 
-    A last loop of one point closes the patch with a fan.
+    A last loop of one point closes the patch with a triangle fan.
     """
     points, faces, first = np.concatenate(loops), [], 0
     for outer, inner in pairwise(loops):
@@ -70,23 +71,23 @@ def rings(loops: Sequence[npt.NDArray[np.float64]]) -> Patch:
 
 
 def disk(radius: float, n_around: int, start: float = 0.0) -> Patch:
-    """Return a flat disk (z = 0, facing up) with about even triangles and ``n_around`` points on its rim."""
+    """Return a planar disk (z = 0, normals up) of evenly sized triangles with ``n_around`` boundary points."""
     n_rings = max(1, round(n_around / (2 * np.pi)))
     loops = [circle(radius, n_around, start)]
     for k in range(1, n_rings):
-        share = 1 - k / n_rings
-        loops.append(circle(radius * share, max(6, round(n_around * share)), start))
-    return rings([*loops, np.zeros((1, 2))])
+        t = 1 - k / n_rings
+        loops.append(circle(radius * t, max(_MIN_DISK_LOOP, round(n_around * t)), start))
+    return patch_between_loops([*loops, np.zeros((1, 2))])
 
 
 def circle(radius: float, n_around: int, start: float = 0.0) -> npt.NDArray[np.float64]:
-    """Return points (n, 2) on a circle around the origin, counter-clockwise from the angle ``start``."""
+    """Return points (n, 2) on a circle around the origin, counter-clockwise from the angle ``start`` in radians."""
     angle = start + 2 * np.pi * np.arange(n_around) / n_around
     return radius * np.stack([np.cos(angle), np.sin(angle)], axis=1)
 
 
-def joined(patches: Sequence[Patch]) -> tuple[Points, Faces, Indices]:
-    """Join patches where their points are equal; return also the new number of each of all the points."""
+def join_patches(patches: Sequence[Patch]) -> tuple[Points, Faces, Indices]:
+    """Join patches at equal points; return points, faces and the index in them of every point of the patches."""
     first = np.cumsum([0, *(len(points) for points, _ in patches)])
     points = np.concatenate([points for points, _ in patches])
     faces = np.concatenate([faces + start for (_, faces), start in zip(patches, first, strict=False)])
@@ -95,4 +96,5 @@ def joined(patches: Sequence[Patch]) -> tuple[Points, Faces, Indices]:
 
 
 def _angles(loop: npt.NDArray[np.float64]) -> npt.NDArray[np.float64]:
+    """Return the angles (n,) of the points of a loop (n, 2), without jumps of a full turn."""
     return np.unwrap(np.arctan2(loop[:, 1], loop[:, 0]))
