@@ -17,8 +17,9 @@ if TYPE_CHECKING:
     from anisomesh.evaluation.report import Evaluation, evaluate
     from anisomesh.io.meshes import load, save
     from anisomesh.mesh.surface import Surface
-    from anisomesh.options import RemeshOptions, StepInfo
+    from anisomesh.options import RemeshOptions
     from anisomesh.pipeline import remesh
+    from anisomesh.progress import StepInfo
     from anisomesh.result import RemeshResult, save_rvd
     from anisomesh.shapes.analytic import sample
     from anisomesh.viz import side_by_side
@@ -55,7 +56,7 @@ _HOME = {
     "OptionError": "errors",
     "RemeshOptions": "options",
     "RemeshResult": "result",
-    "StepInfo": "options",
+    "StepInfo": "progress",
     "Surface": "mesh.surface",
     "evaluate": "evaluation.report",
     "load": "io.meshes",

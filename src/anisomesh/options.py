@@ -1,10 +1,9 @@
-"""How to remesh, and how a run reports its progress."""
+"""How to remesh."""
 
 from __future__ import annotations
 
 import math
 import os
-from collections.abc import Callable
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any, Literal, get_args
 
@@ -14,8 +13,14 @@ from anisomesh.metric.names import METRIC_NAMES, MetricName
 if TYPE_CHECKING:  # the command line imports this module, and has to start at once
     import numpy.typing as npt
 
+    from anisomesh.cvt.energy import Energy
+    from anisomesh.embedding.embedder import Embedder
+    from anisomesh.metric.field import MetricSource
+
 EmbeddingName = Literal["auto", "direct", "neural", "hybrid"]
 DeviceName = Literal["cpu", "cuda"]
+_LEAST = {"seed": 0, "threads": 1, "lloyd_iterations": 0, "max_iterations": 0, "embedding_iterations": 1}
+
 EMBEDDINGS: tuple[EmbeddingName, ...] = get_args(EmbeddingName)
 DEVICES: tuple[DeviceName, ...] = get_args(DeviceName)
 
@@ -32,22 +37,29 @@ class RemeshOptions:
     final_sharpness
         If given, the optimisation ends with this factor (30 brings vertices onto corners and creases).
     metric
-        ``"curvature"``, ``"approximation"``, ``"uniform"``, or tensors (V, 3, 3) at the points of the input, in
-        model units.
+        ``"curvature"``, ``"approximation"``, ``"uniform"``; tensors (V, 3, 3) at the points of the input, in model
+        units; or a :class:`~anisomesh.metric.field.MetricSource`, such as ``Curvature()`` or ``Neural("file")``.
     embedding
-        Where the metric comes from. ``"direct"``: measured principal curvatures; ``"neural"``: a trained network, which
-        takes noise away first; ``"hybrid"``: a mean of both, on the surface without noise; ``"auto"``: hybrid where
-        torch is installed and the metric is ``"curvature"``, the only one that networks know, else direct.
+        ``"direct"``: the metric is measured; ``"neural"``: short for ``metric=Neural(weights, device, denoise)``;
+        ``"hybrid"``: the same for ``Hybrid``, a mean of both; ``"auto"``: hybrid where torch is installed and the
+        metric is ``"curvature"``, the only one that networks predict, else direct. Or an
+        :class:`~anisomesh.embedding.embedder.Embedder`, such as ``Direct(iterations=20)``.
+    energy
+        The energy that the sites minimise, an :class:`~anisomesh.cvt.energy.Energy`; by default
+        ``NormalMetric(sharpness)``.
+    density
+        Positive weights of the energy at the points of the input (V,): triangles are smaller where it is larger, their
+        area inversely proportional to its square root.
     weights
-        For ``"neural"`` and ``"hybrid"``: a file that training has written, or the name of a network that comes with
-        the package; by default the one called ``default``.
+        For ``"neural"`` and ``"hybrid"``: a file of ``anisomesh train``, or the name of a pretrained network; by
+        default the one called ``default``.
     device
         Where the network runs, ``"cpu"`` or ``"cuda"``.
     denoise
-        Whether the result follows the surface that the network sees beneath the noise, where it finds any, and not
-        the noise. Where a tenth of the edges are between faces in one plane nothing is taken away.
+        Whether noise that a network finds in the input is removed first. Designed surfaces, on which a tenth of the
+        edges or more are flat, are left as they are.
     seed
-        Of the start positions; the same seed and input give the same result.
+        Seed of the start positions; the same seed and input give the same result.
     threads
         Worker threads; they do not change the result.
     lloyd_iterations, max_iterations
@@ -55,21 +67,23 @@ class RemeshOptions:
     embedding_iterations
         Bound on the local/global steps of the direct embedding.
     weld_tolerance
-        Points of the input up to this distance (model units) become one.
+        Points of the input up to this distance (model units) are merged.
     feature_angle
-        Edges of the input whose faces differ by more than this many degrees are creases, which edges of the result
-        follow where there are vertices enough; 180 for none. The plain CVT (``sharpness`` 1) has none.
+        Edges of the input whose dihedral angle deviates from flat by more degrees than this are creases, which edges of
+        the result follow where there are enough vertices; 180 for none. The plain CVT (``sharpness`` 1) has none.
     features
         Edges of the input that are creases in any case, as pairs of its points (n, 2).
     time_limit
-        Wall-clock seconds after which the optimisation and the mending of faults end with what they have. The first
-        60 % are for the optimisation. What a valid mesh needs is done all the same, so it may take somewhat longer.
+        Wall-clock seconds after which the optimisation and the repair of faults end with what they have; the first
+        60 % are for the optimisation. What a valid mesh needs is done regardless, so a run may take somewhat longer.
     """
 
     sharpness: float = 7.0
     final_sharpness: float | None = None
-    metric: MetricName | npt.NDArray[Any] = "curvature"
-    embedding: str = "auto"
+    metric: MetricName | npt.NDArray[Any] | MetricSource = "curvature"
+    embedding: str | Embedder = "auto"
+    energy: Energy | None = None
+    density: npt.ArrayLike | None = None
     weights: str | os.PathLike[str] | None = None
     device: str = "cpu"
     denoise: bool = True
@@ -88,40 +102,35 @@ class RemeshOptions:
             value = getattr(self, name)
             if value is not None and not (math.isfinite(value) and value >= 1.0):
                 raise OptionError(f"{name} = {value}; expected a finite number of at least 1 (1 is the plain CVT)")
-        if isinstance(self.metric, str) and self.metric not in METRIC_NAMES:
-            raise OptionError(f"metric = {self.metric!r}; expected one of {', '.join(METRIC_NAMES)}, or tensors")
-        for name, known in (("embedding", EMBEDDINGS), ("device", DEVICES)):
-            if getattr(self, name) not in known:
-                raise OptionError(f"{name} = {getattr(self, name)!r}; expected one of {', '.join(known)}")
-        if self.embedding == "direct" and self.weights is not None:
-            raise OptionError("weights are of a network, and embedding 'direct' has none; ask for 'neural' or 'hybrid'")
-        network = self.embedding in ("neural", "hybrid") or self.weights is not None
-        if network and not (isinstance(self.metric, str) and self.metric == "curvature"):
-            raise OptionError("a network (embedding, weights) predicts the curvature metric and no other")
+        self._check_stages()
         if not 0.0 <= self.feature_angle <= 180.0:
             raise OptionError(f"feature_angle = {self.feature_angle}; expected 0 to 180 degrees")
         if self.time_limit is not None and not self.time_limit > 0.0:
             raise OptionError(f"time_limit = {self.time_limit}; expected a positive number of seconds")
-        for name, low in (
-            ("seed", 0),
-            ("threads", 1),
-            ("lloyd_iterations", 0),
-            ("max_iterations", 0),
-            ("embedding_iterations", 1),
-        ):
+        for name, low in _LEAST.items():
             if getattr(self, name) < low:
                 raise OptionError(f"{name} = {getattr(self, name)}; expected at least {low}")
 
-
-@dataclass(frozen=True, kw_only=True)
-class StepInfo:
-    """One step of a run: the stage, iteration ``iteration`` of at most ``total``, the energy if there is one."""
-
-    stage: str
-    iteration: int = 0
-    total: int = 0
-    energy: float | None = None
-    message: str = ""
-
-
-OnStep = Callable[[StepInfo], None]
+    def _check_stages(self) -> None:
+        """Check metric, embedding and energy, and that they fit each other."""
+        if isinstance(self.metric, str) and self.metric not in METRIC_NAMES:
+            raise OptionError(
+                f"metric = {self.metric!r}; expected one of {', '.join(METRIC_NAMES)}, tensors or a source"
+            )
+        if isinstance(self.embedding, str):
+            if self.embedding not in EMBEDDINGS:
+                raise OptionError(f"embedding = {self.embedding!r}; expected one of {', '.join(EMBEDDINGS)}")
+        elif not callable(self.embedding):
+            raise OptionError(f"embedding = {self.embedding!r}; expected a name or an embedder")
+        if self.device not in DEVICES:
+            raise OptionError(f"device = {self.device!r}; expected one of {', '.join(DEVICES)}")
+        if self.energy is not None:
+            if not callable(getattr(self.energy, "evaluate", None)):
+                raise OptionError(f"energy = {self.energy!r}; expected an object with evaluate(voronoi, sites)")
+            if self.sharpness != type(self).sharpness:
+                raise OptionError("sharpness belongs to the built-in energy; give it to NormalMetric or leave it out")
+        if self.embedding == "direct" and self.weights is not None:
+            raise OptionError("weights belong to a network, and embedding 'direct' has none; use 'neural' or 'hybrid'")
+        network = self.embedding in ("neural", "hybrid") or self.weights is not None
+        if network and not (isinstance(self.metric, str) and self.metric == "curvature"):
+            raise OptionError("a network (embedding, weights) predicts the curvature metric and no other")

@@ -5,22 +5,23 @@ from __future__ import annotations
 import time
 from collections.abc import Iterator
 from contextlib import contextmanager
-from dataclasses import fields, replace
-from functools import partial
+from dataclasses import dataclass, fields, replace
 from typing import Any
 
 import numpy as np
 import numpy.typing as npt
 
-from anisomesh._arrays import EdgeMask
-from anisomesh.cvt.features import Features
-from anisomesh.cvt.optimise import Optimised, Status
-from anisomesh.cvt.schedule import optimise
-from anisomesh.deadline import Clock
-from anisomesh.delaunay.refine import Refined, refine
+from anisomesh._arrays import EdgeMask, PointScalars, PointTensors
+from anisomesh.cvt.lbfgs import Optimised, Status
+from anisomesh.cvt.schedule import DualFeedback, optimise_sites
+from anisomesh.deadline import Deadline
+from anisomesh.delaunay.creases import missing_on_creases
+from anisomesh.delaunay.dual import dual_squared_errors
+from anisomesh.delaunay.meshing import MeshingTask, ValidMesh, mesh_from_sites
+from anisomesh.embedding.embedder import checked_embedding
 from anisomesh.errors import MetricError, OptionError, TimeLimitError
-from anisomesh.estimate import embedded, estimated
 from anisomesh.features.detect import sharp_edges
+from anisomesh.features.network import FeatureNetwork, trace_features
 from anisomesh.features.tagged import edges_within, tagged_edges
 from anisomesh.io.convert import as_surface
 from anisomesh.memory import check_memory
@@ -28,11 +29,14 @@ from anisomesh.mesh.geometry import unit_frame
 from anisomesh.mesh.surface import Surface
 from anisomesh.mesh.validity import Validity, check_validity
 from anisomesh.mesh.working_surface import working_surface
-from anisomesh.metric.names import MetricName
-from anisomesh.options import OnStep, RemeshOptions, StepInfo
+from anisomesh.metric.field import checked_field
+from anisomesh.options import RemeshOptions
+from anisomesh.progress import OnStep, StepInfo, ignore_steps
 from anisomesh.repair.prepare import Prepared, prepare
+from anisomesh.resolve import cvt_options, embedder, embedding_name, follows_creases, metric_source
 from anisomesh.result import RemeshResult
 from anisomesh.search import MIN_VERTICES, smallest_within
+from anisomesh.voronoi.embedded_surface import EmbeddedSurface
 from anisomesh.voronoi.restricted import RestrictedVoronoi
 
 COUNT_TOLERANCE = 0.02  # share of the asked vertices by which the result may differ without a warning
@@ -93,109 +97,143 @@ def remesh(
     "NASM: Neural Anisotropic Surface Meshing", SIGGRAPH Asia 2024.
     """
     options = _with_overrides(options or RemeshOptions(), overrides)
-    clock = Clock(options.time_limit)
-    run = _Run(on_step or (lambda step: None), clock)
-    given = as_surface(mesh, faces)
+    deadline = Deadline(options.time_limit)
+    run = _Run(on_step or ignore_steps, deadline)
+    surface = as_surface(mesh, faces)
     _check_count(n_vertices, ratio, max_error)
     with run.stage("prepare"):
-        prepared = prepare(given, weld_tolerance=options.weld_tolerance)
-        tagged = np.zeros(len(prepared.surface.edges), dtype=bool)
-        if options.features is not None:
-            tagged = tagged_edges(given, options.features, prepared.surface, options.weld_tolerance)
-        wanted = options.metric
-        if not isinstance(wanted, str):
-            wanted = _at_prepared(np.asarray(wanted), given, prepared)
+        source = _prepared_input(surface, options)
+    prepared = source.prepared.surface
     if max_error is not None:
-        options = replace(options, denoise=False)  # the distance asked for is from the input as it is
+        options = replace(options, denoise=False)  # the distance asked for refers to the input itself
 
         def with_vertices(n: int) -> RemeshResult:
             run.on_step(StepInfo(stage="search", message=f"{n:,} vertices"))
-            return _remesh(prepared, wanted, tagged, n, options, run)
+            return _remesh(source, n, options, run)
 
-        return smallest_within(with_vertices, prepared.surface, max_error, clock)
-    n = n_vertices or max(MIN_VERTICES, round((ratio or 0.0) * prepared.surface.n_points))
-    return _remesh(prepared, wanted, tagged, n, options, run)
+        return smallest_within(with_vertices, prepared, max_error, deadline)
+    n = n_vertices or max(MIN_VERTICES, round((ratio or 0.0) * prepared.n_points))
+    return _remesh(source, n, options, run)
 
 
-def _remesh(
-    prepared: Prepared,
-    wanted: MetricName | npt.NDArray[np.float64],
-    tagged: EdgeMask,
-    n: int,
-    options: RemeshOptions,
-    run: _Run,
-) -> RemeshResult:
-    """Remesh a prepared surface with n vertices, given the metric's name or tensors at its points, and tagged edges."""
+@dataclass(frozen=True, kw_only=True, eq=False)
+class _Input:
+    """A prepared surface with everything that belongs to its points and edges.
+
+    Attributes
+    ----------
+    prepared
+        The prepared surface.
+    tensors, density
+        Metric (V, 3, 3) and density (V,) at its points, None if they are not prescribed.
+    tagged
+        Which of its edges (E,) are features in any case.
+    """
+
+    prepared: Prepared
+    tensors: PointTensors | None
+    density: PointScalars | None
+    tagged: EdgeMask
+
+
+def _prepared_input(surface: Surface, options: RemeshOptions) -> _Input:
+    """Return the prepared surface and what the options say of its points and edges."""
+    prepared = prepare(surface, weld_tolerance=options.weld_tolerance)
+    tensors = density = None
+    if not isinstance(options.metric, str) and not callable(options.metric):
+        tensors = _at_prepared("metric", options.metric, (surface.n_points, 3, 3), prepared)
+    if options.density is not None:
+        density = _at_prepared("density", options.density, (surface.n_points,), prepared)
+        if not (np.isfinite(density) & (density > 0.0)).all():
+            raise OptionError("density has a value that is not a positive number; expected a positive weight per point")
+    tagged = np.zeros(len(prepared.surface.edges), dtype=bool)
+    if options.features is not None:
+        tagged = tagged_edges(surface, options.features, prepared.surface, options.weld_tolerance)
+    return _Input(prepared=prepared, tensors=tensors, density=density, tagged=tagged)
+
+
+def _remesh(source: _Input, n: int, options: RemeshOptions, run: _Run) -> RemeshResult:
+    """Remesh a prepared surface with n vertices."""
+    prepared = source.prepared
     with run.stage("prepare"):
         frame = unit_frame(prepared.surface.points)
-        given = prepared.surface.with_points(frame.to_unit(prepared.surface.points))
-        split = working_surface(given, n)
+        surface = prepared.surface.with_points(frame.to_unit(prepared.surface.points))
+        split = working_surface(surface, n)
         check_memory(n, split.surface.n_faces)
-        if not isinstance(wanted, str):
-            wanted = wanted * frame.scale**2
     with run.stage("metric"):
-        estimate = estimated(given, split, wanted, options)
-        working = estimate.working
+        tensors = None if source.tensors is None else split.interpolate(source.tensors * frame.scale**2)
+        field = checked_field(metric_source(options, surface, tensors)(split.surface), split.surface)
+        working = split.surface
+        if field.points is not None:
+            working = working.with_points(field.points)
+            surface = surface.with_points(field.points[: surface.n_points])
     with run.stage("embed"):
-        embedding = embedded(estimate, options.embedding_iterations)
+        embedding = checked_embedding(embedder(options)(working, field), working)
     run.check_time()
     with run.stage("cvt"):
-        voronoi = RestrictedVoronoi(embedding.points, working.faces, threads=options.threads)
-        ordered = Surface(working.points, voronoi.faces)
-        features = _features(voronoi, ordered, n, edges_within(split, given, tagged), options)
-        stop = partial(run.clock.over, OPTIMISATION_SHARE)
-        optimised = optimise(voronoi, n, ordered, features, embedding.scale, options, run.on_step, stop)
-    with run.stage("dual"):
-        refined = refine(
+        density = None if source.density is None else split.interpolate(source.density)
+        embedded = EmbeddedSurface(working, embedding.points, embedding.scale, density)
+        voronoi = RestrictedVoronoi(embedded, threads=options.threads)
+        features = _features(embedded, n, edges_within(split, surface, source.tagged), options)
+        optimised = optimise_sites(
             voronoi,
-            optimised.sites,
-            ordered,
-            estimate.plain,
+            n,
             features,
-            embedding.scale,
-            n_vertices=n,
-            tensors=estimate.tensors,
-            stop=run.clock.over,
+            cvt_options(options),
+            feedback=DualFeedback(dual_squared_errors, missing_on_creases),
+            on_step=run.on_step,
+            deadline=run.deadline.share(OPTIMISATION_SHARE),
         )
-        surface = Surface(frame.to_model(refined.points), refined.faces)
-        validity = check_validity(Surface(refined.points, refined.faces), estimate.plain)
+    with run.stage("dual"):
+        task = MeshingTask(
+            voronoi=voronoi,
+            features=features,
+            fallback=surface,
+            tensors=field.tensors,
+            n_vertices=n,
+            deadline=run.deadline,
+        )
+        mesh = mesh_from_sites(task, optimised.sites)
+        validity = check_validity(Surface(mesh.points, mesh.faces), surface)
     return RemeshResult(
-        surface=surface,
+        surface=Surface(frame.to_model(mesh.points), mesh.faces),
         prepared=prepared.surface,
         prepare_report=prepared.report,
         working=working,
-        embedded=estimate.kind,
-        noise=estimate.noise,
+        tensors=field.tensors,
+        embedding_name=embedding_name(options),
+        noise=field.noise,
         frame=frame,
         embedding=embedding,
-        diagram=refined.diagram,
-        cells=refined.cells,
+        cells=mesh.cells,
         vertices_asked=n,
         energy=optimised.energy,
         iterations=optimised.iterations,
         status=optimised.status,
-        inserted=refined.inserted,
-        removed=refined.removed,
+        inserted=mesh.inserted,
+        removed=mesh.removed,
         validity=validity,
         seconds=run.total_seconds(),
-        warnings=tuple(_warnings(n, surface, estimate.noise, refined, validity, optimised, options)),
+        warnings=tuple(_warnings(n, field.noise, mesh, validity, optimised, options)),
     )
 
 
-def _features(
-    voronoi: RestrictedVoronoi, surface: Surface, n: int, tagged: EdgeMask, options: RemeshOptions
-) -> Features:
-    """Return boundary and creases; the plain CVT has none of the latter but those that are tagged."""
-    angle = options.feature_angle if options.sharpness > 1.0 else 180.0
-    return Features(voronoi, surface, n, sharp_edges(surface, angle) | tagged, tagged)
+def _features(embedded: EmbeddedSurface, n: int, tagged: EdgeMask, options: RemeshOptions) -> FeatureNetwork:
+    """Return boundary and creases; with the plain CVT only the tagged edges are creases.
+
+    ``tagged`` are edges (E,) of the embedded surface.
+    """
+    angle = options.feature_angle if follows_creases(options) else 180.0
+    sharp = sharp_edges(embedded.surface, angle) | tagged
+    return trace_features(embedded.points, embedded.surface, n, embedded.site_spacing(n), sharp=sharp, required=tagged)
 
 
 class _Run:
     """Stage times, time limit and progress of one run."""
 
-    def __init__(self, on_step: OnStep, clock: Clock) -> None:
+    def __init__(self, on_step: OnStep, deadline: Deadline) -> None:
         self.on_step = on_step
-        self.clock = clock
+        self.deadline = deadline
         self._seconds = {"load": 0.0}
 
     @contextmanager
@@ -206,14 +244,14 @@ class _Run:
         self._seconds[name] = self._seconds.get(name, 0.0) + time.perf_counter() - start
 
     def check_time(self) -> None:
-        if self.clock.over(OPTIMISATION_SHARE):
+        if self.deadline.share(OPTIMISATION_SHARE).passed():
             raise TimeLimitError(
-                f"the time limit of {self.clock.limit:g} s was as good as over before the optimisation began (after "
-                f"{self.clock.seconds:.1f} s); give more time, or ask for fewer vertices"
+                f"the time limit of {self.deadline.limit:g} s was as good as over before the optimisation began (after "
+                f"{self.deadline.seconds:.1f} s); give more time, or ask for fewer vertices"
             )
 
     def total_seconds(self) -> dict[str, float]:
-        return {**self._seconds, "total": self.clock.seconds}
+        return {**self._seconds, "total": self.deadline.seconds}
 
 
 def _with_overrides(options: RemeshOptions, overrides: dict[str, Any]) -> RemeshOptions:
@@ -235,39 +273,40 @@ def _check_count(n_vertices: int | None, ratio: float | None, max_error: float |
         raise OptionError(f"ratio = {ratio}; expected a positive number, such as 0.2 for a fifth of the vertices")
 
 
-def _at_prepared(tensors: npt.NDArray[Any], given: Surface, prepared: Prepared) -> npt.NDArray[np.float64]:
-    if tensors.shape != (given.n_points, 3, 3):
-        raise MetricError(f"metric has shape {tensors.shape}; expected ({given.n_points}, 3, 3), one tensor per point")
-    return np.asarray(tensors[prepared.point_source], dtype=np.float64)
+def _at_prepared(name: str, values: Any, shape: tuple[int, ...], prepared: Prepared) -> npt.NDArray[np.float64]:
+    """Return values at the points of the input as values at the prepared points."""
+    if np.shape(values) != shape:
+        wanted = MetricError if name == "metric" else OptionError
+        raise wanted(f"{name} has shape {np.shape(values)}; expected {shape}: one value for each point of the input")
+    try:
+        return np.asarray(np.asarray(values, dtype=np.float64)[prepared.point_source])
+    except (TypeError, ValueError) as error:
+        raise MetricError(f"{name} cannot be read as numbers: {error}") from error
 
 
 def _warnings(
-    n: int,
-    surface: Surface,
-    noise: float,
-    refined: Refined,
-    validity: Validity,
-    optimised: Optimised,
-    options: RemeshOptions,
+    n: int, noise: float, mesh: ValidMesh, validity: Validity, optimised: Optimised, options: RemeshOptions
 ) -> Iterator[str]:
+    """Yield what a user should know about the result."""
+    n_points = len(mesh.points)
     if noise > 0.0:
-        yield f"noise of {noise:.2f} mean edge lengths was taken away first; the result follows the surface beneath it"
+        yield f"noise of {noise:.2f} mean edge lengths was removed first; the result follows the denoised surface"
     if optimised.status is Status.TIME_LIMIT:
         count = optimised.iterations
         yield f"the time limit of {options.time_limit:g} s ended the optimisation after {count} iterations"
-    if refined.from_input:
+    if mesh.from_input:
         yield (
-            f"{n:,} vertices are too few for cells that are disks; the input itself was coarsened instead, and its "
-            "triangles do not follow the metric: ask for more vertices"
+            f"{n:,} vertices are too few for the topology of the surface; the input itself was coarsened instead, and "
+            "its triangles do not follow the metric: ask for more vertices"
         )
-    if abs(surface.n_points - n) > COUNT_TOLERANCE * n:
-        why = "fewer would fold the surface or change its topology" if surface.n_points > n else "it has no more"
-        yield f"{surface.n_points:,} vertices instead of {n:,}: {why}"
+    if abs(n_points - n) > COUNT_TOLERANCE * n:
+        why = "fewer would fold the surface or change its topology" if n_points > n else "it has no more"
+        yield f"{n_points:,} vertices instead of {n:,}: {why}"
     if validity.euler != validity.euler_input:
         yield f"the Euler characteristic is {validity.euler} instead of {validity.euler_input}; ask for more vertices"
     if validity.flat:
         yield f"{validity.flat:,} triangles have no area"
     if validity.inverted:
-        yield f"{validity.inverted:,} triangles are turned against the input surface"
+        yield f"{validity.inverted:,} triangles are inverted against the input surface"
     if validity.new_intersections:
         yield f"{validity.new_intersections:,} pairs of triangles intersect where the input does not"

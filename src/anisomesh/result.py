@@ -6,16 +6,17 @@ import os
 from dataclasses import dataclass
 from typing import Any
 
-from anisomesh.cvt.optimise import Status
-from anisomesh.embedding.base import Embedding
+from anisomesh._arrays import PointTensors, Sites
+from anisomesh.cvt.lbfgs import Status
+from anisomesh.embedding.base import Embedding, StretchStatistics
 from anisomesh.io.rvd import PolygonMesh, save_polygons
 from anisomesh.mesh.geometry import Frame
 from anisomesh.mesh.surface import Surface
 from anisomesh.mesh.validity import Validity
 from anisomesh.repair.prepare import PrepareReport
-from anisomesh.voronoi.cells import Cells
+from anisomesh.voronoi.cells import CellComplex
 from anisomesh.voronoi.diagram import Diagram
-from anisomesh.voronoi.polygons import polygon_mesh
+from anisomesh.voronoi.polygons import cell_polygons
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -31,30 +32,29 @@ class RemeshResult:
     prepare_report
         What the repair did, as counts.
     working
-        The prepared input with long edges split, at bounding-box diagonal 1: what was embedded.
-    embedded
-        ``"direct"``, ``"neural"`` or ``"hybrid"``: where the metric comes from.
+        The surface that was embedded: the prepared input at bounding-box diagonal 1, long edges split, noise removed.
+    tensors
+        The metric at the points of ``working`` (V, 3, 3), at bounding-box diagonal 1.
+    embedding_name
+        ``"direct"``, ``"neural"`` or ``"hybrid"``, or the name of a metric source of the user.
     noise
-        Noise that a network has found in the input and taken away before anything else: root mean square height over
-        ``working``, in mean edge lengths; 0 where none was taken away.
+        Root mean square height of the noise that was removed from the input, in mean edge lengths of ``working``.
     frame
         The similarity between model units and ``working``.
     embedding
         The embedding of ``working``.
-    diagram
-        The restricted Voronoi diagram whose dual the result is.
     cells
-        Its cell components.
+        The cell components of the restricted Voronoi diagram that the result is dual to.
     vertices_asked
         The vertex count asked for.
     energy, iterations, status
-        Of the optimisation: final energy at diagonal 1, iterations, why it stopped.
+        Final energy of the optimisation at bounding-box diagonal 1, its iterations, and why it stopped.
     inserted, removed
-        Points that were added to make the mesh valid, and points taken away to keep to the number asked for.
+        Points added to make the mesh valid, and points removed to reach the number of vertices asked for.
     validity
         Checks of the result against the prepared input.
     distance
-        The largest distance from the input found, both ways, in model units; None unless a largest one was asked for.
+        Largest distance between result and input, both ways, in model units; None unless ``max_error`` was given.
     seconds
         Wall-clock seconds per stage.
     warnings
@@ -65,12 +65,12 @@ class RemeshResult:
     prepared: Surface
     prepare_report: PrepareReport
     working: Surface
-    embedded: str
+    tensors: PointTensors
+    embedding_name: str
     noise: float
     frame: Frame
     embedding: Embedding
-    diagram: Diagram
-    cells: Cells
+    cells: CellComplex
     vertices_asked: int
     energy: float
     iterations: int
@@ -82,6 +82,26 @@ class RemeshResult:
     warnings: tuple[str, ...]
     distance: float | None = None
 
+    @property
+    def diagram(self) -> Diagram:
+        """The restricted Voronoi diagram that the result is dual to."""
+        return self.cells.diagram
+
+    @property
+    def sites(self) -> Sites:
+        """The sites of the diagram in the embedding (S, d), sites added for the topology last."""
+        return self.cells.diagram.sites
+
+    @property
+    def residual(self) -> float:
+        """Relative residual of the embedding against the metric; 0 when exact."""
+        return self.embedding.residual
+
+    @property
+    def stretch(self) -> StretchStatistics:
+        """Stretch that the metric asks for and the embedding achieves."""
+        return self.embedding.stretch
+
     def report(self) -> dict[str, Any]:
         """Return the figures of the run as a dictionary that JSON can hold."""
         return {
@@ -90,21 +110,21 @@ class RemeshResult:
             "faces": self.surface.n_faces,
             "seconds": dict(self.seconds),
             "distance": self.distance,
-            "embedding": self.embedded,
+            "embedding": self.embedding_name,
             "noise": self.noise,
             "energy": self.energy,
             "iterations": self.iterations,
             "status": self.status.value,
             "inserted": self.inserted,
             "removed": self.removed,
-            "stretch": {"mean": self.embedding.stretch.achieved_mean, "max": self.embedding.stretch.achieved_max},
+            "stretch": {"mean": self.stretch.achieved_mean, "max": self.stretch.achieved_max},
             "validity": self.validity.as_dict(),
             "warnings": list(self.warnings),
         }
 
     def polygons(self) -> PolygonMesh:
         """Return the restricted Voronoi diagram as polygons in model units."""
-        return polygon_mesh(self.diagram, self.cells.of_polygon, self.frame.to_model(self.working.points))
+        return cell_polygons(self.cells, self.frame.to_model(self.working.points))
 
 
 def save_rvd(result: RemeshResult, path: str | os.PathLike[str]) -> None:

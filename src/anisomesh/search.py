@@ -6,7 +6,7 @@ from collections.abc import Callable
 from dataclasses import replace
 from math import exp, log
 
-from anisomesh.deadline import Clock
+from anisomesh.deadline import Deadline
 from anisomesh.errors import OptionError, TimeLimitError
 from anisomesh.mesh.distance import surface_distance
 from anisomesh.mesh.surface import Surface
@@ -21,7 +21,7 @@ SAMPLES = 50_000  # points on each surface that distances are taken from, beside
 
 
 def smallest_within(
-    remesh: Callable[[int], RemeshResult], surface: Surface, max_error: float, clock: Clock
+    remesh: Callable[[int], RemeshResult], surface: Surface, max_error: float, deadline: Deadline
 ) -> RemeshResult:
     """Return the smallest remesh found whose distance from the surface, both ways, is at most ``max_error``.
 
@@ -33,7 +33,7 @@ def smallest_within(
         The surface that is remeshed.
     max_error
         Largest distance, in its units.
-    clock
+    deadline
         The search ends when its limit is over, if there is a result that does.
 
     Raises
@@ -56,7 +56,7 @@ def smallest_within(
     most = MOST_RATIO * surface.n_points + MOST_MORE
     first = max(MIN_VERTICES, round(FIRST_RATIO * surface.n_points))
     try:
-        n, error = smallest_count(error_at, max_error, first, MIN_VERTICES, most, stop=clock.over)
+        n, error = smallest_count(error_at, max_error, first, MIN_VERTICES, most, stop=deadline.passed)
     except TimeLimitError:
         if not results:
             raise

@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 from scipy import sparse
 
@@ -12,6 +12,7 @@ from anisomesh.embedding.ordering import nested_dissection
 from anisomesh.embedding.poisson import factorise, poisson_solver
 from anisomesh.mesh.surface import Surface
 from anisomesh.shapes.analytic import ellipsoid, open_patch, sphere, torus
+from conftest import examples
 
 
 def two_shapes():
@@ -29,7 +30,7 @@ def polar(maps, frames):
 
 
 @given(seed=st.integers(0, 2**31), k=st.integers(3, 6))
-@settings(max_examples=30)
+@examples(30)
 def test_polar_factor_is_the_one_of_the_singular_value_decomposition(seed, k):
     rng = np.random.default_rng(seed)
     maps = rng.standard_normal((40, 2, k)) * 10.0 ** rng.uniform(-6, 6, (40, 1, 1))
@@ -69,7 +70,7 @@ def test_polar_factor_of_nothing_is_the_frame():
 
 
 @given(seed=st.integers(0, 2**31))
-@settings(max_examples=20)
+@examples(20)
 def test_local_step_is_the_nearest_gradient_of_the_wanted_lengths(seed):
     rng = np.random.default_rng(seed)
     jacobian, half = rng.standard_normal((30, 2, 5)), rng.standard_normal((30, 2, 2))
@@ -84,7 +85,7 @@ def test_local_step_is_the_nearest_gradient_of_the_wanted_lengths(seed):
 
 
 @given(seed=st.integers(0, 2**31))
-@settings(max_examples=30)
+@examples(30)
 def test_eigenvectors_of_2x2_tensors(seed):
     rng = np.random.default_rng(seed)
     half = rng.standard_normal((30, 2, 2))

@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from anisomesh._arrays import EmbeddedPoints, Faces, FaceScalars, Sites
+from anisomesh.cvt.energy import Energy
 from anisomesh.voronoi.restricted import RestrictedVoronoi
 
 
@@ -39,7 +40,7 @@ def sample_surface(
     return np.asarray(np.einsum("nc,ncd->nd", barycentric, points[faces[face]]))
 
 
-def resample_by_energy(voronoi: RestrictedVoronoi, sites: Sites, sharpness: float, rng: np.random.Generator) -> Sites:
+def resample_by_energy(voronoi: RestrictedVoronoi, sites: Sites, energy: Energy, rng: np.random.Generator) -> Sites:
     """Return as many new sites (S, d), denser where the cells of these sites have more energy for their size.
 
     Parameters
@@ -47,22 +48,24 @@ def resample_by_energy(voronoi: RestrictedVoronoi, sites: Sites, sharpness: floa
     voronoi
         The diagram over the embedded surface.
     sites
-        Sites spread evenly (S, d): cells of about equal area.
-    sharpness
-        The factor s of the normal metric in the energy; the larger, the more the sites gather where the surface
-        bends.
+        Evenly spread sites (S, d), with cells of about equal area.
+    energy
+        The energy; the sharper a normal metric, the more the sites gather where the surface bends.
     rng
         The only source of randomness.
 
     Notes
     -----
-    In an optimal tessellation cells have equal energies (Gersho 1979), but descent moves sites only near by. The
+    In an optimal tessellation cells have equal energies (Gersho 1979), but descent moves sites only locally. The
     density is the area times the square root of (energy / area^2) of the cell, which is constant where the plain
     energy dominates and grows where the surface leaves the tangent plane within a cell.
     """
-    evaluation = voronoi.evaluate(sites, sharpness)
-    density = np.sqrt(np.maximum(evaluation.cell_energy, 0.0)) / np.maximum(evaluation.mass, np.finfo(np.float64).tiny)
-    diagram = voronoi.diagram(sites)
+    value = energy.evaluate(voronoi, sites)
+    diagram, embedded = voronoi.diagram(sites), voronoi.embedded
+    area = value.mass
+    if embedded.density is not None:
+        area = np.bincount(diagram.site, diagram.fractions * embedded.face_areas[diagram.facet], minlength=len(sites))
+    density = np.sqrt(np.maximum(value.per_cell, 0.0)) / np.maximum(area, np.finfo(np.float64).tiny)
     share = diagram.fractions * density[diagram.site]
-    weights = np.bincount(diagram.facet, share, minlength=len(voronoi.faces)) * voronoi.facets.area
-    return sample_surface(voronoi.points, voronoi.faces, weights, len(sites), rng)
+    weights = np.bincount(diagram.facet, share, minlength=embedded.surface.n_faces) * embedded.face_areas
+    return sample_surface(embedded.points, embedded.faces, weights, len(sites), rng)

@@ -1,45 +1,33 @@
-"""The dual at the boundary: cells with one arc each, and their vertices on the boundary."""
+"""Sites that the dual needs at the boundary: one interval per cell component, three per boundary loop."""
 
 from __future__ import annotations
 
 import numpy as np
 
-from anisomesh._arrays import EmbeddedPoints, PointMask, Points, Sites
-from anisomesh.cvt.boundary import BoundaryArcs
-from anisomesh.features.boundary import BoundaryCurves
-from anisomesh.voronoi.cells import Cells
-from anisomesh.voronoi.intervals import nearest_to_sites
+from anisomesh._arrays import EmbeddedPoints
+from anisomesh.features.boundary import BoundaryLoops
+from anisomesh.voronoi.cells import CellComplex
+from anisomesh.voronoi.intervals import BoundaryIntervals, nearest_to_sites
 
-MIN_ARCS = 3  # of a boundary curve, so that the dual has a loop there
+MIN_INTERVALS = 3  # of a boundary loop, so that the dual has a loop there
 
 
-def points_on_boundary(arcs: BoundaryArcs, curves: BoundaryCurves, cells: Cells, sites: Sites) -> EmbeddedPoints:
+def points_on_boundary(intervals: BoundaryIntervals, loops: BoundaryLoops, cells: CellComplex) -> EmbeddedPoints:
     """Return points of the boundary (n, d) that are missing as sites.
 
-    A component of a cell with several arcs would pinch the dual, and a boundary curve of fewer than three arcs has no
-    loop in it. New sites go to the arcs of such a cell but the one nearest to its site, at the point closest to the
-    site: so near the tip of a wedge sites on its sides come to be opposite each other. They also go to the quarter
-    points of the longest arc of such a curve, and to corners that share their arc with others.
+    A component of a cell with several boundary intervals would pinch the dual, and a boundary loop of fewer than three
+    intervals has no loop in it. New sites go to the intervals of such a cell, except for the one nearest to its site,
+    at the point closest to the site: so near the tip of a wedge sites on its two sides become opposite each other. They
+    also go to the quarter points of the longest interval of such a loop, and to corners that share their interval with
+    others.
     """
-    component = cells.of_polygon[arcs.polygon]
-    distance = np.linalg.norm(sites[arcs.site] - arcs.place, axis=1)
+    sites = cells.diagram.sites
+    component = cells.of_polygon[intervals.polygon]
+    distance = np.linalg.norm(sites[intervals.site] - intervals.place, axis=1)
     order = np.lexsort((distance, component))
-    torn = order[1:][component[order[1:]] == component[order[:-1]]]
-    few = np.flatnonzero(np.bincount(arcs.curve, minlength=curves.n_curves) < MIN_ARCS)
-    order = np.lexsort((arcs.length, arcs.curve))
-    longest = order[np.searchsorted(arcs.curve[order], few, side="right") - 1]
-    quarters = [curves.at(arcs.start[longest] + share * arcs.length[longest], few) for share in (0.25, 0.75)]
-    return np.concatenate([nearest_to_sites(arcs, curves, torn, sites), *quarters, arcs.second])
-
-
-def put_on_boundary(points: Points, arcs: BoundaryArcs, cells: Cells) -> tuple[Points, PointMask]:
-    """Return the vertices of the dual (V, d), those of cells at the boundary on their arcs, and which these are (V,).
-
-    The vertex goes to the sharpest corner in the arc, or else to the middle of it; of several arcs the longest counts.
-    """
-    component = cells.of_polygon[arcs.polygon]
-    order = np.argsort(arcs.length, kind="stable")
-    moved, mask = np.array(points), np.zeros(len(points), dtype=bool)
-    moved[component[order]] = arcs.place[order]
-    mask[component] = True
-    return moved, mask
+    further = order[1:][component[order[1:]] == component[order[:-1]]]
+    few = np.flatnonzero(np.bincount(intervals.polyline, minlength=loops.n_polylines) < MIN_INTERVALS)
+    order = np.lexsort((intervals.length, intervals.polyline))
+    longest = order[np.searchsorted(intervals.polyline[order], few, side="right") - 1]
+    quarters = [loops.at(intervals.start[longest] + share * intervals.length[longest], few) for share in (0.25, 0.75)]
+    return np.concatenate([nearest_to_sites(intervals, loops, further, sites), *quarters, intervals.crowded_corners])

@@ -1,18 +1,18 @@
-"""From triangles glued along chains to a simplicial mesh: no loop edge, no edge twice."""
+"""From a delta complex to a simplicial complex: no edge from a point to itself, no two edges with the same ends."""
 
 from __future__ import annotations
 
 import numpy as np
 import numpy.typing as npt
 
-from anisomesh._arrays import Points
+from anisomesh._arrays import EmbeddedPoints, Faces
 from anisomesh.delaunay.dual import Dual
 
-MAX_ROUNDS = 20
+MAX_SPLIT_ROUNDS = 20  # heuristic; two are enough almost always
 
 
-class GluedTriangles:
-    """Triangles with named edges, so that two edges may join the same two points.
+class DeltaComplex:
+    """Triangles with numbered edges, several of which may join the same two points (Hatcher 2002, section 2.1).
 
     Attributes
     ----------
@@ -36,7 +36,7 @@ class GluedTriangles:
                 self._faces_at.setdefault(edge, []).append(face)
 
     def surplus_edges(self) -> list[int]:
-        """Return the edges from a point to itself, and of edges between the same two points all but the first."""
+        """Return the edges that no simplicial complex has: from a point to itself, or second ones between two points."""
         edges = np.array(self.face_edges).ravel()
         ends = np.sort(np.array(self.faces)[:, [[1, 2], [2, 0], [0, 1]]].reshape(-1, 2), axis=1)
         edges, first = np.unique(edges, return_index=True)
@@ -80,26 +80,26 @@ class GluedTriangles:
         return self._n_edges - 1
 
 
-def simplicial_mesh(dual: Dual) -> tuple[Points, npt.NDArray[np.int32], bool]:
-    """Return points (V, d) and faces (F, 3) of the dual after splitting edges until none is there twice.
+def simplicial_mesh(dual: Dual) -> tuple[EmbeddedPoints, Faces, bool]:
+    """Return points (V, d) and faces (F, 3) of the dual after splitting edges until it is a simplicial complex.
 
     Returns
     -------
     points, faces
-        The first points are those of the dual. The faces, glued where they share two points, make up the same
-        surface as the triangles of the dual glued along chains.
+        The first points are the points of the dual. The faces, glued where they share two points, make up the same
+        surface as the triangles glued along dual edges.
     done
         Whether no surplus edge is left.
 
     Notes
     -----
-    If every cell is a disk the dual is a triangulated surface in the wide sense: two triangles may share two
-    points without being neighbours, and a point may be its own neighbour. A point on every surplus edge takes that
-    away, as a subdivision would, but only where it is needed; a split makes surplus edges only next to a point
-    with one or two triangles, so few rounds are enough.
+    If every cell is a disk, the dual is a delta complex: two triangles may share two points without being neighbours,
+    and a point may be its own neighbour. A point on every surplus edge removes it, as a subdivision would, but only
+    where it is needed; a split makes surplus edges only next to a point with one or two triangles, so few rounds are
+    enough.
     """
-    mesh = GluedTriangles(dual)
-    for _ in range(MAX_ROUNDS):
+    mesh = DeltaComplex(dual)
+    for _ in range(MAX_SPLIT_ROUNDS):
         surplus = mesh.surplus_edges()
         if not surplus:
             break

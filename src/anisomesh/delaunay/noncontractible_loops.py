@@ -1,4 +1,4 @@
-"""Shortest loops in cells that are no disks, and points on them that cut the cells open when they become sites."""
+"""Shortest noncontractible loops in non-disk cells, and points on them that cut the cells open as new sites."""
 
 from __future__ import annotations
 
@@ -11,13 +11,13 @@ from scipy.sparse import coo_array
 from scipy.sparse.csgraph import dijkstra
 
 from anisomesh._arrays import EmbeddedPoints
-from anisomesh.mesh.surface import Surface
-from anisomesh.voronoi.cells import Cells
-from anisomesh.voronoi.diagram import Diagram
+from anisomesh.voronoi.cells import CellComplex
 
 Indices = npt.NDArray[np.int64]
 
-_DETOUR = 1.5  # a loop so many times as long as the one that is tight about its hole is a noose: there, and back
+_MAX_DETOUR = (
+    1.5  # ratio of a loop through the site to the tightest loop around the same hole, up to which it is cut; heuristic
+)
 
 
 @dataclass(frozen=True, eq=False)
@@ -37,7 +37,7 @@ class _Patches:
     length
         Of the way from centre to centre through the gate (m,).
     ends
-        The vertices of the surface at the ends of each side (m, 2), -1 for an end at the rim of the cell.
+        The points of the surface at the ends of each side (m, 2), -1 for an end on the boundary of the cell.
     """
 
     cell: Indices
@@ -65,30 +65,27 @@ class _Loop:
         return np.stack([np.interp(wanted, along, coordinate) for coordinate in self.corners.T], axis=1)
 
 
-def points_on_loops(diagram: Diagram, cells: Cells, surface: Surface) -> EmbeddedPoints:
-    """Return points (n, d) on a loop that cannot be shrunk in each cell that is no disk, nor a whole closed component.
-
-    Parameters
-    ----------
-    diagram, cells
-        The diagram and the components of its cells.
-    surface
-        The surface in space, its faces in the order of the diagram.
+def points_on_noncontractible_loops(cells: CellComplex) -> EmbeddedPoints:
+    """Return points (n, d) on a noncontractible loop in each non-disk cell, to become sites.
 
     Notes
     -----
-    A cell about a tube, a hole or a cone has a loop through its site that cannot be shrunk. Two points divide the
-    shortest one in three with the site, so that three cells meet all around. Where the hole is far from the site this
-    loop leads there and back; then three points go on the one that is tight about the hole. Points far from the site
-    would do neither in a cell that is longer than wide: their own cells close about the tube again, and about a cone
-    they come nearer to its tip without end.
+    A cell around a tube, a hole or a cone has a noncontractible loop through its site. Two points divide the shortest
+    one in three with the site, so that three cells meet all around. Where the hole is far from the site this loop leads
+    there and back; then three points are placed on the tightest loop around the hole. The farthest points of a cell
+    would do neither in a long cell: their own cells close around the tube again, and around a cone they approach its
+    apex without end. A cell that is a whole closed component has no such loop.
 
-    The sides that a tree of shortest paths does not cross, less those that hang on by one end, are the cut locus of its
-    root, and a loop that crosses it once cannot be shrunk (Erickson and Whittlesey 2005, greedy optimal homotopy and
-    homology generators).
+    The sides of facets that a tree of shortest paths does not cross, with hanging ends pruned, are the cut locus of its
+    root, and a loop that crosses it once is noncontractible.
+
+    References
+    ----------
+    Erickson, Whittlesey, "Greedy optimal homotopy and homology generators", SODA 2005.
     """
+    diagram = cells.diagram
     chosen = np.flatnonzero(cells.euler != 1)
-    patches = _patches(diagram, cells, surface, chosen)
+    patches = _patches(cells, chosen)
     starts = diagram.sites[cells.site[chosen]].copy()
     loops = _shortest_loops(patches, _nearest(patches, starts))
     for number, loop in loops.items():
@@ -96,16 +93,17 @@ def points_on_loops(diagram: Diagram, cells: Cells, surface: Surface) -> Embedde
     tight = _shortest_loops(patches, _nearest(patches, starts))
     points = [np.empty((0, diagram.points.shape[1]))]
     for number, loop in loops.items():
-        if loop.steps.sum() <= _DETOUR * tight[number].steps.sum():
+        if loop.steps.sum() <= _MAX_DETOUR * tight[number].steps.sum():
             points.append(loop.at(1 / 3, 2 / 3))
         else:
             points.append(tight[number].at(0.0, 1 / 3, 2 / 3))
     return np.concatenate(points)
 
 
-def _patches(diagram: Diagram, cells: Cells, surface: Surface, chosen: Indices) -> _Patches:
-    """Return the polygons of these components and what they share."""
-    rank = np.full(len(cells.site), -1, dtype=np.int64)
+def _patches(cells: CellComplex, chosen: Indices) -> _Patches:
+    """Return the polygons of these components and the sides that they share."""
+    diagram, surface = cells.diagram, cells.embedded.surface
+    rank = np.full(cells.n_components, -1, dtype=np.int64)
     rank[chosen] = np.arange(len(chosen))
     cell = rank[cells.of_polygon]
     kept = cell >= 0
@@ -144,7 +142,7 @@ def _shortest_loops(patches: _Patches, roots: Indices) -> dict[int, _Loop]:
     graph = coo_array((weight, (patches.pair[:, 0], patches.pair[:, 1])), shape=(n, n)).tocsr()
     distance, before, _ = dijkstra(graph, directed=False, indices=roots, min_only=True, return_predecessors=True)
     here, there = patches.pair.T
-    pairs, sides = np.unique(patches.pair, axis=0, return_index=True)  # two facets can share more than one side
+    pairs, sides = np.unique(patches.pair, axis=0, return_index=True)  # two polygons can share more than one side
     crossed = np.zeros(len(weight), dtype=bool)
     crossed[sides] = (before[pairs[:, 1]] == pairs[:, 0]) | (before[pairs[:, 0]] == pairs[:, 1])
     cut = _cut_locus(patches.ends, crossed)
@@ -170,9 +168,9 @@ def _way_from_root(
 
 
 def _cut_locus(ends: Indices, crossed: npt.NDArray[np.bool_]) -> Indices:
-    """Return which of the sides (m,) that no tree crosses are left when those that hang on by one end are taken away.
+    """Return the sides (n,) not crossed by a tree that are left when sides with a hanging end are pruned.
 
-    An end at the rim of a cell holds; one at a vertex of the surface holds while another side ends there.
+    An end on the boundary of a cell never hangs; an end at a point of the surface hangs if no other side ends there.
     """
     left = np.flatnonzero(~crossed)
     while len(left):

@@ -1,127 +1,112 @@
-"""Where the vertices of the dual go in space."""
+"""Vertex placement: where the vertices of the dual go in space."""
 
 from __future__ import annotations
 
 import numpy as np
 import numpy.typing as npt
 
-from anisomesh._arrays import EdgeMask, EmbeddedPoints, Faces, Points
-from anisomesh.cvt.boundary import BoundaryArcs
-from anisomesh.cvt.features import Features
-from anisomesh.delaunay.boundary import put_on_boundary
-from anisomesh.delaunay.creases import CreasedCells
+from anisomesh._arrays import EdgeMask, EmbeddedPoints, Faces, PointMask, Points
+from anisomesh._groups import first_of_each
+from anisomesh.delaunay.creases import CreaseCells
 from anisomesh.features.detect import corners
+from anisomesh.features.network import FeatureNetwork
 from anisomesh.mesh import geometry
 from anisomesh.mesh.closest_points import ClosestPoints
 from anisomesh.mesh.surface import Surface
-from anisomesh.voronoi.cells import Cells
-from anisomesh.voronoi.diagram import Diagram
-from anisomesh.voronoi.restricted import RestrictedVoronoi
+from anisomesh.voronoi.cells import CellComplex
+from anisomesh.voronoi.intervals import BoundaryIntervals
 
-_SHARPNESS = 100.0
-_MOST_OFF = 0.1  # mean edge lengths by which the vertex may be off a curved crease
-_SAME_PLANE = 1e-9  # by which the normals of facets in one plane may differ
-_NEAR_PLANE = 1e-3  # roots of the area of a cell
-_MISSED = 0.05  # mean edge lengths between a corner and the mesh, from which on it counts as missed
+_CREASE_SHARPNESS = 100.0  # factor s of the normal metric that places vertices of cells with a crease
+_MAX_CREASE_OFFSET = 0.1  # mean edge lengths by which a vertex may be off a curved crease; heuristic
+_SAME_NORMAL = 1e-9  # by which components of the unit normals of coplanar facets may differ: rounding
+_NEAR_PLANE = 1e-3  # roots of the area of a cell, up to which a vertex is put into the cell's main plane; heuristic
+_MISSED_CORNER = 0.05  # mean edge lengths between a corner and the mesh, from which on it counts as missed; heuristic
+
+Ints = npt.NDArray[np.int64]
 
 
-def placed(
-    voronoi: RestrictedVoronoi,
-    diagram: Diagram,
-    cells: Cells,
-    surface: Surface,
-    features: Features,
-    rim: BoundaryArcs,
-    creased: CreasedCells,
+def place_vertices(
+    cells: CellComplex,
+    features: FeatureNetwork,
+    boundary: BoundaryIntervals,
+    creased: CreaseCells,
     points: EmbeddedPoints,
     faces: Faces,
-    scale: float,
 ) -> Points:
-    """Return the points of the dual in space (V, 3).
+    """Return the vertices of the dual in space (V, 3), at bounding-box diagonal 1.
 
     Parameters
     ----------
-    voronoi, diagram, cells
-        The embedded surface, the diagram on it, and the components of its cells, which are the first points.
-    surface
-        The surface in space, its faces in the order of the diagram.
-    features, rim, creased
+    cells
+        The cell components, which are the first vertices.
+    features, boundary, creased
         Boundary and creases, and what the cells have of them.
     points, faces
-        The dual (V, d), (F, 3).
-    scale
-        The factor of the first three embedded coordinates.
+        The dual in the embedding (V, d), (F, 3).
 
     Notes
     -----
-    Vertices of cells that lie in one plane are put in it; those at boundary and creases on these; at a curved crease
-    a little outside, where its chords are nearest to it; those of other cells with a crease where their planes meet.
+    Vertices of cells in one plane are put into it; vertices of cells at boundary and creases onto these, at a curved
+    crease slightly outside, where its chords are nearest to it; vertices of other cells with a crease where the planes
+    of the cell meet.
     """
-    on_rim, fixed = put_on_boundary(points, rim, cells)
-    space = put_on_planes(diagram, cells, surface, points[:, :3] / scale)
-    sharp = cells_with_crease(diagram, cells, surface, features.sharp)
-    where = crease_positions(voronoi, diagram, cells, scale, sharp)
-    space[sharp] = on_main_planes(diagram, cells, surface, sharp, where)
-    space[fixed] = on_rim[fixed, :3] / scale
+    scale = cells.embedded.scale
+    on_boundary, fixed = _onto_boundary(points, boundary, cells)
+    space = project_to_planes(cells, points[:, :3] / scale)
+    sharp = cells_with_crease(cells, features.sharp)
+    meeting = plane_intersections(cells, sharp)
+    space[sharp] = project_to_main_planes(cells, sharp, meeting)
+    space[fixed] = on_boundary[fixed, :3] / scale
     space[creased.cell] = creased.place[:, :3] / scale
-    bent = creased.bent & ~creased.corner
-    limit = _MOST_OFF * float(Surface(space, faces).edge_lengths.mean())
-    off = where[np.searchsorted(sharp, creased.cell[bent])] - space[creased.cell[bent]]
-    along = geometry.unit(creased.chord[bent, :3])
-    off -= np.einsum("nx,nx->n", off, along)[:, None] * along
-    size = np.linalg.norm(off, axis=1)
-    space[creased.cell[bent]] += np.where((size < limit)[:, None], off, 0.0)
+    curved = creased.curved & ~creased.corner
+    limit = _MAX_CREASE_OFFSET * float(Surface(space, faces).edge_lengths.mean())
+    offset = meeting[np.searchsorted(sharp, creased.cell[curved])] - space[creased.cell[curved]]
+    along = geometry.unit(creased.chord[curved, :3])
+    offset -= np.einsum("nx,nx->n", offset, along)[:, None] * along
+    size = np.linalg.norm(offset, axis=1)
+    space[creased.cell[curved]] += np.where((size < limit)[:, None], offset, 0.0)
     fixed[creased.cell] = True
-    return snap_to_missed(diagram, cells, surface, space, faces, features.sharp, ~fixed[: len(cells.site)])
+    return snap_to_missed_corners(cells, space, faces, features.sharp, ~fixed[: cells.n_components])
 
 
-def cells_with_crease(diagram: Diagram, cells: Cells, surface: Surface, sharp: EdgeMask) -> npt.NDArray[np.int64]:
-    """Return the cells (n,) that hold a piece of a sharp edge."""
+def cells_with_crease(cells: CellComplex, sharp: EdgeMask) -> Ints:
+    """Return the components (n,) that contain a piece of a sharp edge of the surface (E,)."""
+    diagram = cells.diagram
     side = np.flatnonzero(diagram.label < 0)
     polygon = diagram.polygon_of[side]
-    edge = surface.face_edges[diagram.facet[polygon], -1 - diagram.label[side]]
+    edge = cells.embedded.surface.face_edges[diagram.facet[polygon], -1 - diagram.label[side]]
     return np.unique(cells.of_polygon[polygon[sharp[edge]]]).astype(np.int64)
 
 
-def crease_positions(
-    voronoi: RestrictedVoronoi, diagram: Diagram, cells: Cells, scale: float, chosen: npt.NDArray[np.int64]
-) -> Points:
-    """Return where the planes in each of the chosen cells meet (n, 3).
-
-    Parameters
-    ----------
-    voronoi, diagram, cells
-        The embedded surface, the diagram on it, and the components of its cells.
-    scale
-        The factor of the first three embedded coordinates.
-    chosen
-        Numbers of the cells (n,), those with a crease.
+def plane_intersections(cells: CellComplex, chosen: Ints) -> Points:
+    """Return where the planes of the facets in each of the chosen components (n,) meet, in space (n, 3).
 
     Notes
     -----
-    The position minimises the normal-metric energy of the cell as it is, with s = 100 instead of the s that the
-    sites were optimised with: on a crease the pull of the centroid, which at s = 7 holds a vertex some per cent of
-    its distance away from a corner, falls below 1e-3. Elsewhere the site keeps its place, because the same
-    minimum moves the vertices of smooth cells about without bringing them nearer to the surface.
+    The position minimises the normal-metric energy of the cell as it is, with s = 100 instead of the s that the sites
+    were optimised with: on a crease the pull of the centroid, which at s = 7 keeps a vertex some per cent of its
+    distance away from a corner, falls below 1e-3. Elsewhere the site keeps its place, because the same minimum moves
+    the vertices of smooth cells about without bringing them nearer to the surface.
     """
-    area = diagram.fractions * voronoi.facets.area[diagram.facet]
-    normal = voronoi.facets.normal[diagram.facet]
-    corner = diagram.points[diagram.faces[diagram.facet, 0], :3] / scale
+    diagram, embedded = cells.diagram, cells.embedded
+    area, normal = cells.polygon_areas, embedded.facets.normal[diagram.facet]
+    corner = diagram.points[diagram.faces[diagram.facet, 0], :3] / embedded.scale
     height = np.einsum("px,px->p", normal, corner)
-    quadric = _per_cell(cells, area[:, None, None] * normal[:, :, None] * normal[:, None, :])[chosen]
-    pull = _per_cell(cells, (area * height)[:, None] * normal)[chosen]
+    quadric = cells.sums(area[:, None, None] * normal[:, :, None] * normal[:, None, :])[chosen]
+    pull = cells.sums((area * height)[:, None] * normal)[chosen]
     mass = np.maximum(cells.area[chosen], np.finfo(np.float64).tiny)
-    factor = _SHARPNESS**2 - 1.0
+    factor = _CREASE_SHARPNESS**2 - 1.0
     matrix = mass[:, None, None] * np.eye(3) + factor * quadric
-    right = mass[:, None] * cells.centroid[chosen, :3] / scale + factor * pull
+    right = mass[:, None] * cells.centroid[chosen, :3] / embedded.scale + factor * pull
     return np.asarray(np.linalg.solve(matrix, right[:, :, None])[:, :, 0])
 
 
-def put_on_planes(diagram: Diagram, cells: Cells, surface: Surface, points: Points) -> Points:
-    """Return the points of the dual (V, 3), those of cells that lie in one plane exactly in it."""
+def project_to_planes(cells: CellComplex, points: Points) -> Points:
+    """Return the vertices (V, 3), the ones of cells in one plane projected into it."""
+    surface, diagram = cells.embedded.surface, cells.diagram
     first = np.unique(cells.of_polygon, return_index=True)[1]
     normal = surface.face_normals[diagram.facet[first]]
-    flat = _planes(diagram, cells, surface) == 1
+    flat = _count_planes(cells) == 1
     start = surface.points[surface.faces[diagram.facet[first], 0]]
     height = np.einsum("cx,cx->c", points[: len(flat)] - start, normal)
     moved = np.array(points)
@@ -129,91 +114,55 @@ def put_on_planes(diagram: Diagram, cells: Cells, surface: Surface, points: Poin
     return moved
 
 
-def on_main_planes(
-    diagram: Diagram, cells: Cells, surface: Surface, chosen: npt.NDArray[np.int64], points: Points
-) -> Points:
-    """Return the points of the chosen cells (n, 3), exactly in the plane of the largest piece of the cell if near it.
+def project_to_main_planes(cells: CellComplex, chosen: Ints, points: Points) -> Points:
+    """Return the vertices of the chosen components (n, 3), projected into the plane of the largest piece if near it.
 
-    That is for cells in two planes: a sliver beyond a crease pulls the vertex a little out of the plane that all the
-    rest is in, without bringing it to the crease.
+    Only for components in two planes: a sliver beyond a crease pulls the vertex slightly out of the plane of all the
+    rest, without bringing it to the crease.
     """
+    surface, diagram = cells.embedded.surface, cells.diagram
     area = diagram.fractions * surface.face_areas[diagram.facet]
-    order = np.lexsort((-area, cells.of_polygon))
-    facet = diagram.facet[order[np.unique(cells.of_polygon[order], return_index=True)[1]]][chosen]
+    _, largest = first_of_each(cells.of_polygon, np.argsort(-area, kind="stable"))
+    facet = diagram.facet[largest][chosen]
     normal, start = surface.face_normals[facet], surface.points[surface.faces[facet, 0]]
     height = np.einsum("nx,nx->n", points - start, normal)
     size = np.sqrt(np.bincount(cells.of_polygon, area)[chosen])
-    near = (np.abs(height) < _NEAR_PLANE * size) & (_planes(diagram, cells, surface)[chosen] == 2)
+    near = (np.abs(height) < _NEAR_PLANE * size) & (_count_planes(cells)[chosen] == 2)
     return np.where(near[:, None], points - height[:, None] * normal, points)
 
 
-def _planes(diagram: Diagram, cells: Cells, surface: Surface) -> npt.NDArray[np.int64]:
-    """Return how many directions the facets of each cell have (C,): 1, 2, or 3 for more."""
-    normal, cell = surface.face_normals[diagram.facet], cells.of_polygon
-    first = np.unique(cell, return_index=True)[1]
-    off_first = np.abs(normal - normal[first][cell]).max(axis=1)
-    order = np.lexsort((-off_first, cell))
-    second = order[np.unique(cell[order], return_index=True)[1]]  # the facet that differs most from the first
-    off_both = np.minimum(off_first, np.abs(normal - normal[second][cell]).max(axis=1))
-    size = len(cells.site)
-    more = [np.bincount(cell, off > _SAME_PLANE, minlength=size) > 0 for off in (off_first, off_both)]
-    return 1 + more[0].astype(np.int64) + more[1]
-
-
-def _owners(diagram: Diagram, cells: Cells, surface: Surface) -> npt.NDArray[np.int64]:
-    """Return the cell that each point of the surface (V,) is in, -1 for points without faces."""
-    side = np.flatnonzero(diagram.label < 0)
-    point = diagram.point_at(side)
-    owner = np.full(surface.n_points, -1, dtype=np.int64)
-    owner[point[point >= 0]] = cells.of_polygon[diagram.polygon_of[side[point >= 0]]]
-    return owner
-
-
-def _per_cell(cells: Cells, values: npt.NDArray[np.float64]) -> npt.NDArray[np.float64]:
-    """Return the sum of the values of the polygons (P, ...) in each component (C, ...)."""
-    flat = values.reshape(len(values), -1)
-    sums = [np.bincount(cells.of_polygon, column, minlength=len(cells.site)) for column in flat.T]
-    return np.stack(sums, axis=1).astype(np.float64).reshape(len(cells.site), *values.shape[1:])
-
-
-def snap_to_missed(
-    diagram: Diagram,
-    cells: Cells,
-    surface: Surface,
-    points: Points,
-    faces: Faces,
-    sharp: npt.NDArray[np.bool_],
-    movable: npt.NDArray[np.bool_],
+def snap_to_missed_corners(
+    cells: CellComplex, points: Points, faces: Faces, sharp: EdgeMask, movable: PointMask
 ) -> Points:
-    """Return the points (V, 3), some of them moved to corners that the mesh misses.
+    """Return the vertices (V, 3), some of them moved to corners of the surface that the mesh misses.
 
     Parameters
     ----------
-    diagram, cells
-        The diagram and the components of its cells, which are the first points.
-    surface
-        The surface in space, its faces in the order of the diagram.
+    cells
+        The cell components, which are the first vertices.
     points, faces
         The dual in space (V, 3), (F, 3).
     sharp
         Which edges of the surface (E,) are creases.
     movable
-        Cells whose vertex may move (C,).
+        Components whose vertex may move (C,).
 
     Notes
     -----
-    Where a cell holds little more than the tip of a corner the planes there weigh next to nothing, and the corner
-    is cut off by a tenth of an edge or more. The vertex of a cell goes to the corner in it that the mesh is farthest
-    from, and back if that takes the mesh farther from the surface in the cells around.
+    Where a cell contains little more than the tip of a corner, the planes there weigh next to nothing, and the corner
+    is cut off by a tenth of an edge or more. The vertex of a cell moves to the corner in it that the mesh is farthest
+    from, and back if that increases the distance to the mesh in the cells around.
     """
-    owner = _owners(diagram, cells, surface)
+    surface = cells.embedded.surface
+    owner = _owners(cells)
     mesh = Surface(points, faces)
-    missed = (_MISSED * float(mesh.edge_lengths.mean())) ** 2
+    missed = (_MISSED_CORNER * float(mesh.edge_lengths.mean())) ** 2
     squared = ClosestPoints(mesh).squared_distances(surface.points)
     candidate = np.flatnonzero(corners(surface, sharp) & (owner >= 0) & movable[owner] & (squared > missed))
-    candidate = candidate[np.argsort(squared[candidate], kind="stable")]
+    candidate = candidate[np.argsort(squared[candidate], kind="stable")[::-1]]
+    vertex, farthest = first_of_each(owner, candidate)
     moved = np.array(points)
-    moved[owner[candidate]] = surface.points[candidate]  # of several in a cell the last, the farthest, stays
+    moved[vertex] = surface.points[farthest]
     after_squared = ClosestPoints(Surface(moved, faces)).squared_distances(surface.points)
     change = np.bincount(owner[owner >= 0], (after_squared - squared)[owner >= 0], minlength=len(points))
     around = np.zeros(len(points))
@@ -222,3 +171,36 @@ def snap_to_missed(
     worse = around > 0.0
     moved[worse] = points[worse]
     return moved
+
+
+def _onto_boundary(
+    points: EmbeddedPoints, intervals: BoundaryIntervals, cells: CellComplex
+) -> tuple[Points, PointMask]:
+    """Return the vertices (V, d), the ones of cells at the boundary on their longest intervals, and which these are."""
+    component = cells.of_polygon[intervals.polygon]
+    vertex, longest = first_of_each(component, np.argsort(intervals.length, kind="stable")[::-1])
+    moved, mask = np.array(points), np.zeros(len(points), dtype=bool)
+    moved[vertex] = intervals.place[longest]
+    mask[vertex] = True
+    return moved, mask
+
+
+def _count_planes(cells: CellComplex) -> Ints:
+    """Return how many directions the facets of each component have (C,): 1, 2, or 3 for more."""
+    normal, cell = cells.embedded.surface.face_normals[cells.diagram.facet], cells.of_polygon
+    first = np.unique(cell, return_index=True)[1]
+    off_first = np.abs(normal - normal[first][cell]).max(axis=1)
+    _, second = first_of_each(cell, np.argsort(-off_first, kind="stable"))  # differs most from the first
+    off_both = np.minimum(off_first, np.abs(normal - normal[second][cell]).max(axis=1))
+    more = [np.bincount(cell, off > _SAME_NORMAL, minlength=cells.n_components) > 0 for off in (off_first, off_both)]
+    return 1 + more[0].astype(np.int64) + more[1]
+
+
+def _owners(cells: CellComplex) -> Ints:
+    """Return the component that each point of the surface (V,) is in, -1 for points without faces."""
+    diagram = cells.diagram
+    side = np.flatnonzero(diagram.label < 0)
+    point = diagram.point_at(side)
+    owner = np.full(cells.embedded.surface.n_points, -1, dtype=np.int64)
+    owner[point[point >= 0]] = cells.of_polygon[diagram.polygon_of[side[point >= 0]]]
+    return owner

@@ -1,25 +1,24 @@
-"""Closed components with too few cells for the dual to have their topology."""
+"""Closed components of the surface with too few cells for the dual to have their topology."""
 
 from __future__ import annotations
 
 import numpy as np
 
 from anisomesh._arrays import EmbeddedPoints
-from anisomesh.mesh.surface import Surface
 from anisomesh.mesh.topology import connected_components
-from anisomesh.voronoi.cells import Cells
-from anisomesh.voronoi.diagram import Diagram
+from anisomesh.voronoi.cells import CellComplex
 
-MIN_CELLS = 4  # of a closed component: with three the dual is two triangles back to back, with fewer it has none
+MIN_CELLS = 4  # of a closed component: a tetrahedron; the dual of three is two triangles back to back
 
 
-def points_in_components(diagram: Diagram, cells: Cells, surface: Surface) -> EmbeddedPoints:
-    """Return points (n, d) of the closed components with fewer than four cells, so that they have four.
+def points_in_small_components(cells: CellComplex) -> EmbeddedPoints:
+    """Return points (n, d) to become sites, so that every closed component of the surface has at least four cells.
 
-    They are points of the surface, each the farthest from the sites there and those before it.
+    Each is the point of the surface farthest from the sites on its component and from the points before it.
     """
+    diagram, surface = cells.diagram, cells.embedded.surface
     count, component = connected_components(surface.faces, surface.n_points)
-    cell_component = np.empty(len(cells.site), dtype=np.int64)
+    cell_component = np.empty(cells.n_components, dtype=np.int64)
     cell_component[cells.of_polygon] = component[diagram.facet]
     n_cells = np.bincount(cell_component, minlength=count)
     is_open = np.bincount(component, (surface.face_neighbours < 0).any(axis=1), minlength=count) > 0
@@ -31,4 +30,4 @@ def points_in_components(diagram: Diagram, cells: Cells, surface: Surface) -> Em
         for _ in range(MIN_CELLS - len(present)):
             chosen.append(points[np.argmax(distance)])
             distance = np.minimum(distance, np.linalg.norm(points - chosen[-1], axis=1))
-    return np.array(chosen).reshape(-1, diagram.points.shape[1])
+    return np.array(chosen).reshape(-1, cells.embedded.dimension)

@@ -1,4 +1,4 @@
-"""Polygonal curves on the edges of a surface, measured by arc length."""
+"""Feature polylines: boundaries and creases as polygonal curves on the edges of a surface, measured by arc length."""
 
 from __future__ import annotations
 
@@ -13,93 +13,104 @@ Floats = npt.NDArray[np.float64]
 
 
 @dataclass(frozen=True, eq=False)
-class Curves:
-    """Curves along edges of a surface in R^d, closed or not, with one running arc length.
+class FeaturePolylines:
+    """C polylines of B segments along edges of a surface in R^d, open or closed, with one running arc length.
 
     Attributes
     ----------
-    point, head
-        Start and end of each side (B,), curve by curve.
-    curve
-        Curve of each side (B,), from 0 on.
+    tail, head
+        Points at the start and end of each segment (B,), polyline by polyline.
+    polyline
+        Polyline of each segment (B,).
     start
-        Arc length at the start of each side (B + 1,); a curve begins where the one before it ends.
+        Arc length at the start of each segment (B + 1,), in embedding units; a polyline begins where the previous one
+        ends.
     first
-        First side of each curve (C + 1,).
+        First segment of each polyline (C + 1,).
     closed
-        Whether each curve ends where it begins and goes on there (C,).
+        Which polylines are closed (C,).
     edge
-        Edge of the surface that each side is (B,).
-    rank
-        The side that is opposite each corner of a face (F, 3), -1 for none. A side within the surface is named by one
-        of its two faces only.
+        Edge of the surface under each segment (B,).
+    segment_of_side
+        Segment on the side opposite each corner of a face (F, 3), -1 for none. A segment inside the surface is listed
+        for one of its two faces only.
     positions
         Points of the surface (V, d).
     """
 
-    point: Ints
+    tail: Ints
     head: Ints
-    curve: Ints
+    polyline: Ints
     start: Floats
     first: Ints
     closed: npt.NDArray[np.bool_]
     edge: Ints
-    rank: Ints
+    segment_of_side: Ints
     positions: Floats
 
     @property
-    def n_curves(self) -> int:
-        """Number of curves."""
+    def n_polylines(self) -> int:
+        """Number of polylines C."""
         return len(self.first) - 1
 
     @property
     def limits(self) -> Floats:
-        """Arc length at the ends of each curve (C, 2)."""
+        """Arc length at both ends of each polyline (C, 2)."""
         return np.stack([self.start[self.first[:-1]], self.start[self.first[1:]]], axis=1)
 
-    def wrapped(self, place: Floats, curve: Ints) -> Floats:
-        """Return places (n,) brought into their curves: by whole turns, or to the nearer end of one that is open."""
-        low, high = self.limits[curve].T
+    @property
+    def ends(self) -> Ints:
+        """Points at the start and end of each polyline (C, 2), -1 for closed ones."""
+        ends = np.stack([self.tail[self.first[:-1]], self.head[self.first[1:] - 1]], axis=1)
+        return np.where(self.closed[:, None], -1, ends)
+
+    def wrapped(self, place: Floats, polyline: Ints) -> Floats:
+        """Return arc lengths (n,) moved onto their polylines: modulo the length if closed, clamped to it if open."""
+        low, high = self.limits[polyline].T
         length = np.maximum(high - low, np.finfo(np.float64).tiny)
         around = low + np.mod(place - low, length)
-        return np.asarray(np.where(self.closed[curve], around, np.clip(place, low, high)))
+        return np.asarray(np.where(self.closed[polyline], around, np.clip(place, low, high)))
 
-    def side_at(self, place: Floats, curve: Ints) -> Ints:
-        """Return the sides (n,) at these arc lengths (n,), of any number of turns, on these curves (n,)."""
-        side = np.searchsorted(self.start, self.wrapped(place, curve), side="right") - 1
-        return np.clip(side, self.first[curve], self.first[curve + 1] - 1)
+    def segment_at(self, place: Floats, polyline: Ints) -> Ints:
+        """Return the segments (n,) at arc lengths (n,) on polylines (n,)."""
+        segment = np.searchsorted(self.start, self.wrapped(place, polyline), side="right") - 1
+        return np.clip(segment, self.first[polyline], self.first[polyline + 1] - 1)
 
-    def at(self, place: Floats, curve: Ints) -> Floats:
-        """Return the points (n, d) at these arc lengths (n,), of any number of turns, on these curves (n,)."""
-        place, side = self.wrapped(place, curve), self.side_at(place, curve)
-        length = np.maximum(self.start[side + 1] - self.start[side], np.finfo(np.float64).tiny)
-        share = np.clip((place - self.start[side]) / length, 0.0, 1.0)[:, None]
-        return np.asarray((1.0 - share) * self.positions[self.point[side]] + share * self.positions[self.head[side]])
+    def at(self, place: Floats, polyline: Ints) -> Floats:
+        """Return the points (n, d) at arc lengths (n,) on polylines (n,)."""
+        place, segment = self.wrapped(place, polyline), self.segment_at(place, polyline)
+        length = np.maximum(self.start[segment + 1] - self.start[segment], np.finfo(np.float64).tiny)
+        share = np.clip((place - self.start[segment]) / length, 0.0, 1.0)[:, None]
+        tail, head = self.positions[self.tail[segment]], self.positions[self.head[segment]]
+        return np.asarray((1.0 - share) * tail + share * head)
 
     @classmethod
-    def along(
-        cls, positions: Floats, rank: Ints, edge: Ints, ends: Ints, lengths: list[int], closed: list[bool]
+    def of_segments(
+        cls, positions: Floats, ends: Ints, sizes: list[int], closed: list[bool], *, edge: Ints, segment_of_side: Ints
     ) -> Self:
-        """Return curves.
+        """Return polylines made of segments.
 
         Parameters
         ----------
-        positions, rank, edge
-            As above.
+        positions
+            Points of the surface (V, d).
         ends
-            Start and end of each side (B, 2), curve by curve.
-        lengths, closed
-            Number of sides of each curve (C,), and whether it is closed.
+            Points at both ends of each segment (B, 2), polyline by polyline.
+        sizes, closed
+            Number of segments of each polyline (C,), and whether it is closed.
+        edge, segment_of_side
+            As the attributes.
         """
         length = np.linalg.norm(positions[ends[:, 1]] - positions[ends[:, 0]], axis=1)
+        counts = np.array(sizes, dtype=np.int64)
         return cls(
-            point=ends[:, 0],
+            tail=ends[:, 0],
             head=ends[:, 1],
-            curve=np.repeat(np.arange(len(lengths)), np.array(lengths, dtype=np.int64)),
+            polyline=np.repeat(np.arange(len(sizes)), counts),
             start=np.concatenate([[0.0], np.cumsum(length)]),
-            first=np.concatenate([[0], np.cumsum(np.array(lengths, dtype=np.int64))]).astype(np.int64),
+            first=np.concatenate([[0], np.cumsum(counts)]).astype(np.int64),
             closed=np.array(closed, dtype=bool),
             edge=edge,
-            rank=rank,
+            segment_of_side=segment_of_side,
             positions=np.asarray(positions),
         )

@@ -9,7 +9,7 @@ import numpy as np
 import numpy.typing as npt
 
 from anisomesh._arrays import Faces, Points
-from anisomesh.deadline import Stop, never
+from anisomesh.deadline import NO_DEADLINE, Deadline
 from anisomesh.mesh import geometry
 from anisomesh.mesh.closest_points import ClosestPoints
 from anisomesh.mesh.intersections import self_intersections
@@ -44,12 +44,12 @@ class _Tries:
     """How many more pairs may be looked at, and the pieces of meshes on which nothing helped."""
 
     left: int
-    stop: Stop
+    deadline: Deadline
     failed: set[bytes] = field(default_factory=set)
 
 
 def separate(
-    points: Points, faces: Faces, reference: ClosestPoints, *, max_tries: int = 300, stop: Stop = never
+    points: Points, faces: Faces, reference: ClosestPoints, *, max_tries: int = 300, deadline: Deadline = NO_DEADLINE
 ) -> tuple[Points, Faces, int]:
     """Mend pairs of triangles that intersect, where the reference does not, without changing the topology.
 
@@ -61,7 +61,7 @@ def separate(
         The surface that it stands for.
     max_tries
         Pairs that are looked at, in all rounds together; one amid many faces counts for several.
-    stop
+    deadline
         Asked before every pair whether to end.
 
     Returns
@@ -82,7 +82,7 @@ def separate(
     crossing = crossing_facets(reference.surface)
     best = points, faces, len(faces) ** 2
     splits = 0
-    tries = _Tries(max_tries, stop)
+    tries = _Tries(max_tries, deadline)
     for _ in range(MAX_ROUNDS):
         surface = Surface(points, faces)
         pairs = new_intersections(surface, crossing).astype(np.int64)
@@ -107,7 +107,7 @@ def _changes(
     corners = surface.points[surface.faces]
     boxes = corners.min(axis=1), corners.max(axis=1)
     for pair in pairs:
-        if tries.left <= 0 or tries.stop():
+        if tries.left <= 0 or tries.deadline.passed():
             break
         zone = _zone(surface, pair, boxes)
         if busy[zone].any():

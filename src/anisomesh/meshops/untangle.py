@@ -8,7 +8,7 @@ import numpy as np
 import numpy.typing as npt
 
 from anisomesh._arrays import FaceMask, Faces, Points
-from anisomesh.deadline import Stop, never
+from anisomesh.deadline import NO_DEADLINE, Deadline
 from anisomesh.mesh import geometry
 from anisomesh.mesh.closest_points import ClosestPoints
 from anisomesh.mesh.surface import Surface
@@ -22,7 +22,7 @@ _LIFTS = (0.0, 0.1, 0.25, 0.5, 1.0)  # trial heights over an edge, in edge lengt
 
 
 def untangle(
-    points: Points, faces: Faces, reference: ClosestPoints, *, stop: Stop = never
+    points: Points, faces: Faces, reference: ClosestPoints, *, deadline: Deadline = NO_DEADLINE
 ) -> tuple[Points, Faces, int]:
     """Mend triangles that face away from the reference, without changing the topology.
 
@@ -32,7 +32,7 @@ def untangle(
         An oriented manifold mesh (V, 3), (F, 3).
     reference
         The surface that it stands for.
-    stop
+    deadline
         Asked before every round whether to end.
 
     Returns
@@ -60,7 +60,7 @@ def untangle(
         left = int(turned.sum())
         if left < best[2]:
             best = points, faces, left
-        if left == 0 or stop():
+        if left == 0 or deadline.passed():
             break
         for mend in (_flip, to_average, nudge, _collapse, _split, relax):
             mended: Mended = mend(surface, turned, reference, failed)

@@ -10,6 +10,7 @@ import numpy as np
 import numpy.typing as npt
 
 from anisomesh._arrays import EmbeddedPoints, Faces, Sites
+from anisomesh.voronoi.embedded_surface import EmbeddedSurface
 
 Ints = npt.NDArray[np.int32]
 
@@ -23,8 +24,8 @@ class Diagram:
 
     Attributes
     ----------
-    points, faces
-        The embedded surface: (V, d), and (F, 3) in the order that ``facet`` refers to.
+    embedded
+        The embedded surface; ``facet`` refers to its faces.
     sites
         Positions (S, d).
     facet, site
@@ -38,14 +39,23 @@ class Diagram:
         Coordinates of the vertices in their facet (Q, 3).
     """
 
-    points: EmbeddedPoints
-    faces: Faces
+    embedded: EmbeddedSurface
     sites: Sites
     facet: Ints
     site: Ints
     offset: npt.NDArray[np.int64]
     label: Ints
     barycentric: npt.NDArray[np.float64]
+
+    @property
+    def points(self) -> EmbeddedPoints:
+        """Points of the embedded surface (V, d)."""
+        return self.embedded.points
+
+    @property
+    def faces(self) -> Faces:
+        """Faces of the embedded surface (F, 3)."""
+        return self.embedded.faces
 
     @cached_property
     def polygon_of(self) -> Ints:
@@ -92,7 +102,7 @@ class Diagram:
 
     def at(self, facet: npt.NDArray[Any], barycentric: npt.NDArray[np.float64]) -> npt.NDArray[np.float64]:
         """Return embedded positions (n, d) of points given by facet (n,) and barycentric coordinates (n, 3)."""
-        return np.asarray(np.einsum("nc,ncd->nd", barycentric, self.points[self.faces[facet]]))
+        return self.embedded.at(facet, barycentric)
 
     def point_at(self, vertices: npt.NDArray[Any]) -> npt.NDArray[np.int64]:
         """Return the point of the surface that each of these vertices (n,) is, -1 where a bisector ends."""
@@ -127,7 +137,7 @@ class DiagramPart(NamedTuple):
         return cls(facet, site, size, np.empty(n_vertices, dtype=np.int32), np.empty((n_vertices, 3)))
 
 
-def assemble(points: EmbeddedPoints, faces: Faces, sites: Sites, parts: list[DiagramPart]) -> Diagram:
+def assemble(embedded: EmbeddedSurface, sites: Sites, parts: list[DiagramPart]) -> Diagram:
     """Return the diagram made of these parts, polygons in the order of facet and site; the list is emptied."""
     facet, site, size = (np.concatenate([part[k] for part in parts]) for k in range(3))
     order = np.lexsort((site, facet))
@@ -140,4 +150,4 @@ def assemble(points: EmbeddedPoints, faces: Faces, sites: Sites, parts: list[Dia
         start, here = start[: len(start) - len(part.size)], start[len(start) - len(part.size) :]
         target = np.repeat(here - np.cumsum(part.size) + part.size, part.size) + np.arange(len(part.label))
         label[target], barycentric[target] = part.label, part.barycentric
-    return Diagram(points, faces, sites, facet[order], site[order], offset, label, barycentric)
+    return Diagram(embedded, sites, facet[order], site[order], offset, label, barycentric)

@@ -1,4 +1,4 @@
-"""The arcs into which cells cut curves on the surface."""
+"""The intervals into which the cells of a diagram cut the feature polylines of its surface."""
 
 from __future__ import annotations
 
@@ -8,119 +8,171 @@ import numpy as np
 import numpy.typing as npt
 
 from anisomesh._arrays import EmbeddedPoints, Points, Sites
-from anisomesh.features.polylines import Curves, Floats, Ints
+from anisomesh._groups import first_of_each
+from anisomesh.features.network import FeatureNetwork
+from anisomesh.features.polylines import FeaturePolylines, Floats, Ints
 from anisomesh.voronoi.diagram import Diagram
 
-LONG = 0.4  # of the distance between sites: a cell with a longer arc gets its site onto the curve
-_SAMPLES = 32  # of an arc, for the point closest to its site
+LONG_INTERVAL = 0.4  # site spacings; a cell with a longer interval of a feature belongs to it; heuristic
+SAME_PLACE = 1e-6  # site spacings; places so near to each other are one: well above rounding, far below an edge
+_INTERVAL_SAMPLES = 32  # points of an interval among which the closest to a site is sought
 
 Mask = npt.NDArray[np.bool_]
 
 
 @dataclass(frozen=True, eq=False)
-class Arcs:
-    """Pieces of curves in one cell each: A of them, along the curves.
+class CellIntervals:
+    """A intervals of polylines, each in one cell, in their order along the polylines.
 
     Attributes
     ----------
     site
-        Site of each arc (A,).
+        Site of each interval (A,).
     polygon
-        A polygon of the diagram at each arc (A,).
-    curve
-        Curve of each arc (A,).
+        A polygon of the diagram at each interval (A,).
+    polyline
+        Polyline of each interval (A,).
     start, end
-        Running arc length at its ends (A,); the end is past that of the curve where the arc goes over it.
+        Arc length at its ends (A,); the end of an interval over the seam of a closed polyline exceeds the polyline's.
     place
-        Its middle (A, d).
+        Where a site on the interval goes (A, d): the middle.
     """
 
     site: Ints
     polygon: Ints
-    curve: Ints
+    polyline: Ints
     start: Floats
     end: Floats
     place: Points
 
     @property
     def length(self) -> Floats:
-        """Length of each arc (A,) in the embedding."""
+        """Length of each interval (A,) in the embedding."""
         return np.asarray(self.end - self.start)
 
-    def draw(self, sites: Sites, there: Mask, spacing: float) -> tuple[Sites, Mask]:
-        """Return the sites (S, d) with those that belong to the curves on them, and which these are (S,).
 
-        Parameters
-        ----------
-        sites
-            Positions (S, d).
-        there
-            Which of them are on the curves already (S,); others come if they have a long arc.
-        spacing
-            Distance between sites.
+@dataclass(frozen=True, eq=False)
+class BoundaryIntervals(CellIntervals):
+    """Intervals of the boundary and the corners in them.
 
-        Notes
-        -----
-        A site goes to the place of its longest arc: Lloyd's algorithm on a curve.
-        """
-        order = np.lexsort((self.length, self.site))
-        longest = order[changes(self.site[order][::-1])[::-1]]
-        chosen = longest[there[self.site[longest]] | (self.length[longest] > LONG * spacing)]
-        drawn, mask = np.array(sites), np.zeros(len(sites), dtype=bool)
-        drawn[self.site[chosen]] = self.place[chosen]
-        mask[self.site[chosen]] = True
-        return drawn, mask
+    Attributes
+    ----------
+    place
+        The sharpest corner in the interval, or else its middle (A, d).
+    corner
+        That corner as a number among the corners of the boundary (A,), -1 for none.
+    crowded_corners
+        Corners that share their interval with a sharper one and are not at its site (n, d).
+    """
+
+    corner: Ints
+    crowded_corners: Points
 
 
-def arcs_of(curves: Curves, diagram: Diagram) -> Arcs:
-    """Return the arcs that the cells of a diagram cut the curves on its surface into, in order of their starts."""
-    polygon, side, share = _segments(curves, diagram)
-    length = curves.start[side + 1] - curves.start[side]
-    place = curves.start[side, None] + share * length[:, None]
-    site, curve = diagram.site[polygon].astype(np.int64), curves.curve[side]
-    first = np.flatnonzero(changes(site) | changes(curve))
+@dataclass(frozen=True, eq=False)
+class CreaseIntervals(CellIntervals):
+    """Intervals of creases.
+
+    Attributes
+    ----------
+    corners
+        Points of the surface that are corners at the start and end of each interval (A, 2), -1 for none.
+    """
+
+    corners: Ints
+
+    def corner_owners(self) -> tuple[Ints, Ints]:
+        """Return an interval at each corner (n,), and the corner (n,)."""
+        interval, end = np.nonzero(self.corners >= 0)
+        point, first = np.unique(self.corners[interval, end], return_index=True)
+        return interval[first], point
+
+
+def cell_intervals(polylines: FeaturePolylines, diagram: Diagram) -> CellIntervals:
+    """Return the intervals into which the cells of a diagram cut polylines on its surface."""
+    polygon, segment, share = _pieces(polylines, diagram)
+    length = polylines.start[segment + 1] - polylines.start[segment]
+    place = polylines.start[segment, None] + share * length[:, None]
+    site, polyline = diagram.site[polygon].astype(np.int64), polylines.polyline[segment]
+    first = np.flatnonzero(starts_run(site) | starts_run(polyline))
     last = np.append(first[1:], len(site))[: len(first)] - 1
-    site, curve, polygon = site[first], curve[first], polygon[first]
+    site, polyline, polygon = site[first], polyline[first], polygon[first]
     start, end = place[first, 0], place[last, 1]
-    # the first and the last arc of a closed curve are one where they have the same site
-    head = np.flatnonzero(changes(curve))
-    tail = np.append(head[1:], len(curve))[: len(head)] - 1
-    joined = (head != tail) & (site[head] == site[tail]) & curves.closed[curve[head]]
+    # the first and the last interval of a closed polyline are one if they have the same site
+    head = np.flatnonzero(starts_run(polyline))
+    tail = np.append(head[1:], len(polyline))[: len(head)] - 1
+    joined = (head != tail) & (site[head] == site[tail]) & polylines.closed[polyline[head]]
     end[tail[joined]] += (end - start)[head[joined]]
     kept = np.ones(len(site), dtype=bool)
     kept[head[joined]] = False
-    site, polygon, curve, start, end = site[kept], polygon[kept], curve[kept], start[kept], end[kept]
-    place = curves.at(0.5 * (start + end), curve)
-    return Arcs(site=site, polygon=polygon, curve=curve, start=start, end=end, place=place)
+    site, polygon, polyline, start, end = site[kept], polygon[kept], polyline[kept], start[kept], end[kept]
+    place = polylines.at(0.5 * (start + end), polyline)
+    return CellIntervals(site=site, polygon=polygon, polyline=polyline, start=start, end=end, place=place)
 
 
-def nearest_to_sites(arcs: Arcs, curves: Curves, which: Ints, sites: Sites) -> EmbeddedPoints:
-    """Return the point of each of these arcs (n,) that is closest to its site (n, d), within a share of the arc."""
-    shares = (np.arange(_SAMPLES) + 0.5) / _SAMPLES
-    places = arcs.start[which, None] + shares * arcs.length[which, None]
-    points = curves.at(places.ravel(), np.repeat(arcs.curve[which], _SAMPLES)).reshape(
-        len(which), _SAMPLES, sites.shape[1]
-    )
-    distance = np.linalg.norm(points - sites[arcs.site[which], None], axis=2)
+def boundary_intervals(features: FeatureNetwork, diagram: Diagram) -> BoundaryIntervals:
+    """Return the intervals of the boundary loops, with the corners in them."""
+    loops, corner_segments = features.boundary, features.boundary_corners
+    intervals = cell_intervals(loops, diagram)
+    of_corner = _intervals_at(loops, corner_segments, intervals)
+    corner = np.full(len(intervals.site), -1, dtype=np.int64)
+    owner, sharpest = first_of_each(of_corner, np.argsort(features.boundary_turns, kind="stable")[::-1])
+    corner[owner] = sharpest
+    crowded = np.flatnonzero(np.bincount(of_corner, minlength=len(intervals.site))[of_corner] > 1)
+    at_corner = loops.positions[loops.tail[corner_segments]]
+    away = np.linalg.norm(at_corner[crowded] - diagram.sites[intervals.site[of_corner[crowded]]], axis=1)
+    place = intervals.place.copy()
+    place[corner >= 0] = at_corner[corner[corner >= 0]]
+    crowded_corners = at_corner[crowded[away > SAME_PLACE * features.spacing]]
+    return BoundaryIntervals(**(vars(intervals) | {"place": place}), corner=corner, crowded_corners=crowded_corners)
+
+
+def crease_intervals(features: FeatureNetwork, diagram: Diagram) -> CreaseIntervals:
+    """Return the intervals of the creases, with the corners at their ends."""
+    intervals = cell_intervals(features.creases, diagram)
+    first = starts_run(intervals.polyline)
+    last = np.append(first[1:], True)[: len(first)]
+    at_end = np.stack([first, last], axis=1)
+    corners = np.where(at_end, features.creases.ends[intervals.polyline], -1)
+    return CreaseIntervals(**vars(intervals), corners=corners)
+
+
+def nearest_to_sites(
+    intervals: CellIntervals, polylines: FeaturePolylines, which: Ints, sites: Sites
+) -> EmbeddedPoints:
+    """Return the points (n, d) of some intervals (n,) that are closest to their sites, to 1/32 of the interval."""
+    shares = (np.arange(_INTERVAL_SAMPLES) + 0.5) / _INTERVAL_SAMPLES
+    places = intervals.start[which, None] + shares * intervals.length[which, None]
+    points = polylines.at(places.ravel(), np.repeat(intervals.polyline[which], _INTERVAL_SAMPLES))
+    points = points.reshape(len(which), _INTERVAL_SAMPLES, sites.shape[1])
+    distance = np.linalg.norm(points - sites[intervals.site[which], None], axis=2)
     return np.asarray(points[np.arange(len(which)), np.argmin(distance, axis=1)])
 
 
-def _segments(curves: Curves, diagram: Diagram) -> tuple[Ints, Ints, Floats]:
-    """Return polygon (n,), side of the curves (n,) and share of the side (n, 2) of the pieces in their order."""
+def starts_run(labels: Ints) -> Mask:
+    """Return where labels (n,) differ from the label before; the first one counts as different."""
+    return np.append(True, labels[1:] != labels[:-1])[: len(labels)]
+
+
+def _intervals_at(polylines: FeaturePolylines, segments: Ints, intervals: CellIntervals) -> Ints:
+    """Return the interval that holds the start of each of these segments (n,)."""
+    polyline = polylines.polyline[segments]
+    last = np.searchsorted(intervals.polyline, polyline, side="right") - 1  # it may go over the end of the polyline
+    before = np.searchsorted(intervals.start, polylines.start[segments], side="right") - 1
+    return np.where((before >= 0) & (intervals.polyline[before] == polyline), before, last)
+
+
+def _pieces(polylines: FeaturePolylines, diagram: Diagram) -> tuple[Ints, Ints, Floats]:
+    """Return polygon (n,), segment (n,) and shares of the segment (n, 2) of the pieces of segments, in their order."""
     edge = np.flatnonzero(diagram.label < 0)
     opposite = -1 - diagram.label[edge].astype(np.int64)
-    side = curves.rank[diagram.facet[diagram.polygon_of[edge]], opposite]
-    edge, opposite, side = edge[side >= 0], opposite[side >= 0], side[side >= 0]
+    segment = polylines.segment_of_side[diagram.facet[diagram.polygon_of[edge]], opposite]
+    edge, opposite, segment = edge[segment >= 0], opposite[segment >= 0], segment[segment >= 0]
     facet = diagram.facet[diagram.polygon_of[edge]]
     second = (opposite + 2) % 3  # the corner that a walk around the facet comes to
-    against = diagram.faces[facet, second] != curves.head[side]
+    against = diagram.faces[facet, second] != polylines.head[segment]
     head = np.where(against, (opposite + 1) % 3, second)
     share = np.stack([diagram.barycentric[end, head] for end in (edge, diagram.following[edge])], axis=1)
     share[against] = share[against, ::-1]
-    order = np.lexsort((share[:, 1], share[:, 0], side))
-    return diagram.polygon_of[edge[order]].astype(np.int64), side[order], share[order]
-
-
-def changes(labels: Ints) -> Mask:
-    """Return where a label (n,) is not that of the one before; the first counts as such."""
-    return np.append(True, labels[1:] != labels[:-1])[: len(labels)]
+    order = np.lexsort((share[:, 1], share[:, 0], segment))
+    return diagram.polygon_of[edge[order]].astype(np.int64), segment[order], share[order]

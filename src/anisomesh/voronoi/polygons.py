@@ -1,27 +1,25 @@
-"""The restricted Voronoi diagram as a polygon mesh in space."""
+"""The cells of a restricted Voronoi diagram as polygons in space."""
 
 from __future__ import annotations
 
 import numpy as np
-import numpy.typing as npt
 
 from anisomesh._arrays import Points
 from anisomesh.io.rvd import PolygonMesh
-from anisomesh.voronoi.diagram import Diagram
+from anisomesh.voronoi.cells import CellComplex
 
 
-def polygon_mesh(diagram: Diagram, of_polygon: npt.NDArray[np.int32], points: Points) -> PolygonMesh:
-    """Return the polygons of a diagram on the surface in space whose embedding it lies on.
+def cell_polygons(cells: CellComplex, points: Points) -> PolygonMesh:
+    """Return the polygons of a diagram in space.
 
     Parameters
     ----------
-    diagram
-        The diagram.
-    of_polygon
-        Cell component of each polygon (P,).
+    cells
+        The cells of the diagram.
     points
-        Points (V, 3) of the surface in space.
+        Positions in space (V, 3) of the points of the embedded surface.
     """
+    diagram = cells.diagram
     corners = points[diagram.faces[diagram.facet[diagram.polygon_of]]]
     positions = np.einsum("qc,qcx->qx", diagram.barycentric, corners)
-    return PolygonMesh(points=positions, offset=diagram.offset, cell=of_polygon)
+    return PolygonMesh(points=positions, offset=diagram.offset, cell=cells.of_polygon)

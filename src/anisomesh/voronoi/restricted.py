@@ -9,11 +9,11 @@ from typing import TypeVar
 import numpy as np
 import numpy.typing as npt
 
-from anisomesh._arrays import EmbeddedPoints, Faces, Sites, SiteScalars
+from anisomesh._arrays import Sites, SiteScalars
 from anisomesh._kernels import clip, diagram, integrate
 from anisomesh.errors import OptionError
-from anisomesh.mesh import geometry
 from anisomesh.voronoi.diagram import Diagram, DiagramPart, assemble
+from anisomesh.voronoi.embedded_surface import EmbeddedSurface
 from anisomesh.voronoi.neighbour_lists import NeighbourLists
 from anisomesh.voronoi.threads import Workers
 
@@ -28,14 +28,26 @@ Problems = npt.NDArray[np.int32]  # (n, 2): facet, status
 Part = tuple[npt.NDArray[np.int32], npt.NDArray[np.float64]]
 
 
-@dataclass(frozen=True)
-class Evaluation:
-    """Energy of each cell (S,) and in all (embedding units to the fourth), gradient (S, d), cell areas (S,)."""
+@dataclass(frozen=True, kw_only=True, eq=False)
+class EnergyValue:
+    """An energy of sites and its derivatives.
 
-    energy: float
+    Attributes
+    ----------
+    value
+        The energy; embedding units to the fourth power for the CVT energies.
+    gradient
+        Its derivative by the sites (S, d).
+    mass
+        Weight of each cell (S,): its area times the density. Lloyd's step is gradient / (2 mass).
+    per_cell
+        What each cell contributes (S,); the sum is ``value``.
+    """
+
+    value: float
     gradient: Sites
     mass: SiteScalars
-    cell_energy: SiteScalars
+    per_cell: SiteScalars
 
 
 class RestrictedVoronoi:
@@ -43,12 +55,15 @@ class RestrictedVoronoi:
 
     Parameters
     ----------
-    points
-        Embedded points (V, d); the first three coordinates are those of space, up to a scale.
-    faces
-        Triangles (F, 3).
+    embedded
+        The embedded surface.
     threads
-        Worker threads; the result does not depend on it.
+        Worker threads; the result does not depend on their number.
+
+    Raises
+    ------
+    OptionError
+        If ``threads`` is less than 1.
 
     Notes
     -----
@@ -65,24 +80,27 @@ class RestrictedVoronoi:
     linear enumeration", 2012 (security radius).
     """
 
-    def __init__(self, points: EmbeddedPoints, faces: Faces, *, threads: int = 2) -> None:
+    def __init__(self, embedded: EmbeddedSurface, *, threads: int = 2) -> None:
         if threads < 1:
             raise OptionError(f"threads = {threads}; expected at least 1")
-        self.points = np.require(points, np.float64, ["C", "W"])
-        self.order = _spatial_order(self.points[faces[:, :3], :3].mean(axis=1))
-        self.faces = np.ascontiguousarray(faces[self.order], dtype=np.int32)
-        self.facets = facet_table(self.points, self.faces)
+        self.embedded = embedded
+        self._corners = embedded.points[embedded.faces[:, 0]]  # one of each facet
         self._workers = Workers(threads)
-        self._chunk = int(np.clip(-(-len(faces) // _MIN_CHUNKS), _MIN_CHUNK, _MAX_CHUNK))
+        self._chunk = int(np.clip(-(-embedded.surface.n_faces // _MIN_CHUNKS), _MIN_CHUNK, _MAX_CHUNK))
         self._lists = NeighbourLists(self._workers)
         self._owners = np.zeros(0, dtype=np.int32)
         self._buffers: list[_Buffers] = []
         self._size = 64
 
-    def evaluate(self, sites: Sites, sharpness: float = 1.0) -> Evaluation:
-        """Return energy, gradient and cell areas of the CVT with normal metric I + (s - 1) N N^t.
+    def integrate(self, sites: Sites, sharpness: float = 1.0) -> EnergyValue:
+        """Return the energy of the CVT with the normal metric I + (s - 1) N N^t, times the density, and its gradient.
 
-        With ``sharpness`` s = 1 this is the plain CVT energy, whose gradient is 2 m (x - centroid).
+        Parameters
+        ----------
+        sites
+            Positions (S, d).
+        sharpness
+            The factor s; 1 is the plain CVT energy, whose gradient is 2 mass (site - centroid).
 
         References
         ----------
@@ -93,7 +111,7 @@ class RestrictedVoronoi:
             n, n_problems = integrate.integrate_chunk(
                 chunk,
                 self._owners,
-                self.facets,
+                self.embedded.weighted_facets,
                 self._table,
                 buffers.workspace,
                 sharpness,
@@ -109,33 +127,33 @@ class RestrictedVoronoi:
         gradient, mass, energy = np.zeros_like(sites), np.zeros(len(sites)), np.zeros(len(sites))
         for touched, accumulated in self._run(integrate_chunk, sites):
             integrate.gather(touched, accumulated, gradient, mass, energy)
-        return Evaluation(float(energy.sum()), gradient, mass, energy)
+        return EnergyValue(value=float(energy.sum()), gradient=gradient, mass=mass, per_cell=energy)
 
     def diagram(self, sites: Sites) -> Diagram:
         """Return the diagram in symbolic form: polygons, their vertices and what bounds each edge."""
 
         def write_chunk(chunk: Chunk, buffers: _Buffers) -> tuple[DiagramPart, Problems]:
             n, n_vertices, n_problems = diagram.count_chunk(
-                chunk, self._owners, self.facets, self._table, buffers.workspace, buffers.problems
+                chunk, self._owners, self.embedded.facets, self._table, buffers.workspace, buffers.problems
             )
             problems = buffers.problems[:n_problems].copy()
             part = DiagramPart.empty(n, n_vertices)
             good = np.setdiff1d(chunk, problems[:, 0])
-            diagram.write_chunk(good, self._owners, self.facets, self._table, buffers.workspace, *part)
+            diagram.write_chunk(good, self._owners, self.embedded.facets, self._table, buffers.workspace, *part)
             return part, problems
 
         sites = self._prepare(sites, exact=True)
-        return assemble(self.points, self.faces, np.array(sites), self._run(write_chunk, sites))
+        return assemble(self.embedded, np.array(sites), self._run(write_chunk, sites))
 
     def _prepare(self, sites: Sites, *, exact: bool = False) -> Sites:
         # kernels are compiled anew for other types, orders and read-only arrays
         sites = np.require(sites, np.float64, ["C", "W"])
-        if sites.ndim != 2 or sites.shape[1] != self.points.shape[1] or len(sites) == 0:
-            raise OptionError(f"sites has shape {sites.shape}; expected (S, {self.points.shape[1]}) with S >= 1")
+        if sites.ndim != 2 or sites.shape[1] != self.embedded.dimension or len(sites) == 0:
+            raise OptionError(f"sites has shape {sites.shape}; expected (S, {self.embedded.dimension}) with S >= 1")
         new = len(sites) != self._lists.n_sites
         self._table = self._lists.table(sites, exact=exact)
         if new:
-            self._owners = self._lists.nearest(self.points[self.faces[:, 0]], sites)
+            self._owners = self._lists.nearest(self._corners, sites)
             self._buffers = []
         while len(self._buffers) < self._workers.threads:
             self._buffers.append(self._new_buffers(sites))
@@ -145,8 +163,8 @@ class RestrictedVoronoi:
         return _Buffers(len(sites), sites.shape[1], self._size, self._chunk)
 
     def _run(self, work: Callable[[Chunk, _Buffers], tuple[_T, Problems]], sites: Sites) -> list[_T]:
-        """Run the work on all facets by chunks, again on those with problems once the cause is mended."""
-        facets = np.arange(len(self.faces), dtype=np.int32)
+        """Run the work on all facets by chunks, and again on the facets with problems once their cause is removed."""
+        facets = np.arange(self.embedded.surface.n_faces, dtype=np.int32)
         parts: list[_T] = []
         for _ in range(_MAX_ROUNDS):
             chunks = np.split(facets, np.arange(self._chunk, len(facets), self._chunk))
@@ -155,11 +173,11 @@ class RestrictedVoronoi:
             problems = np.concatenate([problems for _, problems in results])
             if len(problems) == 0:
                 return parts
-            self._mend(problems, sites)
+            self._repair(problems, sites)
             facets = problems[:, 0]
         raise RuntimeError(f"{len(problems)} facets could not be clipped, the first: {problems[0].tolist()}")
 
-    def _mend(self, problems: Problems, sites: Sites) -> None:
+    def _repair(self, problems: Problems, sites: Sites) -> None:
         """Give workspaces more room, facets the nearest owner, lists more neighbours."""
         facet, status = problems.T
         needed = np.max([buffers.workspace.needed for buffers in self._buffers], axis=0)
@@ -170,7 +188,7 @@ class RestrictedVoronoi:
             buffers.workspace.needed[:] = 0.0
         far, none = facet[status == clip.START_TOO_FAR], facet[status == clip.NO_OWNER]
         if len(far):
-            old, corner = self._owners[far], self.points[self.faces[far, 0]]
+            old, corner = self._owners[far], self._corners[far]
             new = self._lists.near(corner, sites)
             distance, old_distance = ((sites[[new, old]] - corner) ** 2).sum(axis=2)
             # of sites at the same place the one of larger index owns all
@@ -178,7 +196,7 @@ class RestrictedVoronoi:
             self._owners[far[better]] = new[better]
             needed[old[better]] = 0.0
         if len(none):
-            self._owners[none] = self._lists.nearest(self.points[self.faces[none, 0]], sites)
+            self._owners[none] = self._lists.nearest(self._corners[none], sites)
         if needed.any():
             self._table = self._lists.grow(sites, needed)
 
@@ -209,28 +227,3 @@ class _Buffers:
         self.touched = np.zeros(rows, dtype=np.int32)
         self.accumulated = np.zeros((rows, dimension + 2))
         self.problems = np.zeros((chunk, 2), dtype=np.int32)
-
-
-def facet_table(points: EmbeddedPoints, faces: Faces) -> clip.Facets:
-    """Return the arrays over facets that the kernels need."""
-    corners = points[faces]
-    side2 = np.stack([((corners[:, (c + 1) % 3] - corners[:, (c + 2) % 3]) ** 2).sum(axis=1) for c in range(3)], axis=1)
-    u, v = corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]
-    uu, uv = (u * u).sum(axis=1), (u * v).sum(axis=1)
-    along = np.divide(uv, uu, out=np.zeros_like(uv), where=uu > 0.0)
-    # not from uu vv - uv^2, which cancels on slivers
-    area = 0.5 * np.sqrt(uu) * np.linalg.norm(v - along[:, None] * u, axis=1)
-    normal = geometry.unit(np.cross(u[:, :3], v[:, :3]))
-    return clip.Facets(faces=faces, points=points, side2=side2, area=area, normal=normal)
-
-
-def _spatial_order(centres: npt.NDArray[np.float64]) -> npt.NDArray[np.int64]:
-    """Return the order of the points (n, 3) along a Morton curve."""
-    low = centres.min(axis=0)
-    extent = float(np.ptp(centres, axis=0).max()) or 1.0
-    cell = np.minimum((centres - low) / extent * 1024, 1023).astype(np.int64)
-    key = np.zeros(len(centres), dtype=np.int64)
-    for bit in range(10):
-        for axis in range(3):
-            key |= (cell[:, axis] >> bit & 1) << (3 * bit + axis)
-    return np.asarray(np.argsort(key, kind="stable"))

@@ -1,0 +1,269 @@
+"""From optimised sites to a valid mesh with the number of vertices asked for."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+import numpy.typing as npt
+
+from anisomesh._arrays import Faces, PointMask, Points, PointTensors, Sites
+from anisomesh.deadline import NO_DEADLINE, Deadline
+from anisomesh.delaunay.delta_complex import simplicial_mesh
+from anisomesh.delaunay.dual import dual_mesh
+from anisomesh.delaunay.faults import faulty_faces, points_at_faults
+from anisomesh.delaunay.placement import place_vertices
+from anisomesh.delaunay.topology_control import ControlledCells, control_topology
+from anisomesh.features.network import FeatureNetwork
+from anisomesh.mesh.closest_points import ClosestPoints
+from anisomesh.mesh.surface import Surface
+from anisomesh.mesh.topology import edge_keys, half_edges
+from anisomesh.meshops.collapse import decimate, fixed_by
+from anisomesh.meshops.edge_recovery import recover_edges
+from anisomesh.meshops.flip import flip_for_shape
+from anisomesh.meshops.self_intersections import separate
+from anisomesh.meshops.split import grow
+from anisomesh.meshops.untangle import untangle
+from anisomesh.metric.tensors import metric_root
+from anisomesh.metric.transfer import transfer_metric_roots
+from anisomesh.voronoi.cells import CellComplex
+from anisomesh.voronoi.restricted import RestrictedVoronoi
+
+MAX_REPEATS = 4  # with more sites at faults; some procedural folds keep faults after two
+_MAX_TRIMS = 3  # rounds of collapses after the removal of self-intersections has added points
+_TRIM_TRIES = 50  # pairs looked at in each of these
+_MAX_TRIES, _MAX_TRIES_COARSENED = 300, 1_000  # pairs of intersecting triangles looked at; for a coarsened input
+MAX_LOCKED_SHARE = 0.5  # of the vertices asked for: corners that collapses leave alone
+MAX_FIXED_SHARE = 0.6  # of the vertices asked for: points that creases fix; heuristic, chosen on training meshes
+
+EdgeEnds = npt.NDArray[np.int64]
+
+
+@dataclass(frozen=True, eq=False)
+class FeatureMesh:
+    """A mesh with edges along creases.
+
+    Attributes
+    ----------
+    points, faces
+        The mesh in space (V, 3), (F, 3).
+    crease_edges
+        Ends of its edges along creases (n, 2).
+    locked
+        Points that collapses keep (V,).
+    """
+
+    points: Points
+    faces: Faces
+    crease_edges: EdgeEnds
+    locked: PointMask
+
+    @classmethod
+    def of(cls, surface: Surface) -> FeatureMesh:
+        """Return a surface without creases or locked points."""
+        none = np.zeros((0, 2), dtype=np.int64)
+        return cls(surface.points, surface.faces, none, np.zeros(surface.n_points, dtype=bool))
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class MeshingTask:
+    """What a mesh is made from, besides sites.
+
+    Attributes
+    ----------
+    voronoi
+        The diagram over the embedded surface.
+    features
+        Boundary and creases of the surface.
+    fallback
+        Another mesh of the same surface, which is coarsened if the sites are too few for its topology.
+    tensors
+        The metric at the points of the embedded surface (V, 3, 3).
+    n_vertices
+        Vertices asked for.
+    deadline
+        When to stop repairing faults.
+    """
+
+    voronoi: RestrictedVoronoi
+    features: FeatureNetwork
+    fallback: Surface
+    tensors: PointTensors
+    n_vertices: int
+    deadline: Deadline = NO_DEADLINE
+
+    @cached_property
+    def reference(self) -> ClosestPoints:
+        """Closest points of the surface in space."""
+        return ClosestPoints(self.voronoi.embedded.surface)
+
+    @cached_property
+    def roots(self) -> PointTensors:
+        """Symmetric square roots of the metric (V, 3, 3)."""
+        return metric_root(self.tensors)
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class ValidMesh:
+    """A valid mesh and how it was reached.
+
+    Attributes
+    ----------
+    points, faces
+        The mesh in space, in the units of the embedded surface.
+    cells
+        The cell components of the diagram that it is dual to.
+    inserted
+        Points added: sites for the topology and creases, and points on duplicate edges.
+    removed
+        Points removed again by edge collapses.
+    from_input
+        Whether the fallback was coarsened, because its topology needs many more sites.
+    """
+
+    points: Points
+    faces: Faces
+    cells: CellComplex
+    inserted: int
+    removed: int
+    from_input: bool
+
+
+def mesh_from_sites(task: MeshingTask, sites: Sites) -> ValidMesh:
+    """Return the dual of the diagram of these sites, made valid, with the vertices asked for where possible.
+
+    Parameters
+    ----------
+    task
+        What the mesh is made from.
+    sites
+        Optimised positions (S, d).
+
+    Notes
+    -----
+    1. Topology control: while a cell is not a disk, new sites go on a noncontractible loop in it; also where a closed
+       component has fewer than four cells, a cell has two boundary intervals, or a boundary loop has fewer than three;
+       and, within a limit, to corners and long intervals of creases without a cell. Nothing else moves.
+    2. When all cells are disks with at most one boundary interval the dual is homeomorphic to the surface. Points on
+       edges that occur twice make the delta complex a simplicial mesh.
+    3. Flips recover edges between vertices that follow each other on a crease.
+    4. Surplus points are removed by edge collapses with the link condition, cheapest first. Where creases fix more than
+       a share of the vertices asked for, collapses do not follow them: they would remove all points beside the creases.
+    5. Inverted triangles are repaired by flips, moves, collapses and splits.
+    6. Edges are flipped where that improves triangles in the metric, and the longest split if points are missing.
+    7. Self-intersections that the surface does not have are removed; added points are compensated by collapses.
+    8. Where triangles are still inverted, flat or intersecting, sites are added and all is repeated, at most four
+       times. The result has more vertices in all only if that makes it valid.
+
+    If step 1 or 2 fails (a tube thinner than the distance between sites), the fallback, which is valid, is coarsened by
+    the same collapses. The paper inserts sites for every defect and optimises again, which makes new defects.
+
+    Every step is bounded, and steps 4 to 7 keep the topology change by change, so the result is always a manifold with
+    the topology of the surface; :func:`anisomesh.mesh.validity.check_validity` counts the geometric faults left.
+
+    References
+    ----------
+    NASM, section 3.4; Edelsbrunner, Shah, "Triangulating topological spaces", 1997.
+    """
+    reference, n_start = task.reference, len(sites)
+    best = trial = _attempt(task, sites, n_start)
+    faulty = bad = faulty_faces(best.points, best.faces, reference)
+    for _ in range(MAX_REPEATS):
+        if len(bad) == 0 or trial.from_input or task.deadline.passed():
+            break
+        corners = trial.points[trial.faces[bad]]
+        more = points_at_faults(corners, reference, task.voronoi.embedded, sites, task.features.spacing)
+        if len(more) == 0:
+            break
+        sites = np.concatenate([sites, more])
+        trial = _attempt(task, sites, n_start)
+        bad = faulty_faces(trial.points, trial.faces, reference)
+        as_few = len(trial.points) <= max(task.n_vertices, len(best.points))
+        if len(bad) == 0 or (len(bad) < len(faulty) and as_few):
+            best, faulty = trial, bad
+    return best
+
+
+def _attempt(task: MeshingTask, sites: Sites, n_start: int) -> ValidMesh:
+    """Return the mesh of these sites, of which the first were optimised: steps 1 to 7 of :func:`mesh_from_sites`."""
+    controlled = control_topology(task.voronoi, sites, task.features, task.n_vertices)
+    dual = _dual_in_space(task, controlled)
+    mesh = dual if dual is not None else FeatureMesh.of(task.fallback)
+    n_first = len(mesh.points)
+    mesh = _coarsened(task, _without_inverted(task, mesh))
+    roots = transfer_metric_roots(task.reference, task.roots, mesh.points)
+    points = mesh.points
+    faces = flip_for_shape(points, mesh.faces, roots, task.reference, kept=mesh.crease_edges)
+    if len(points) < task.n_vertices:
+        points, faces = grow(points, faces, task.n_vertices, task.reference, roots)
+    tries = _MAX_TRIES if dual is not None else _MAX_TRIES_COARSENED
+    points, faces = _without_crossings(task, points, faces, mesh.crease_edges, tries)
+    return ValidMesh(
+        points=points,
+        faces=faces,
+        cells=controlled.cells,
+        inserted=max(n_first - n_start, 0) if dual is not None else 0,
+        removed=max(n_first - len(points), 0),
+        from_input=dual is None,
+    )
+
+
+def _dual_in_space(task: MeshingTask, controlled: ControlledCells) -> FeatureMesh | None:
+    """Return the dual in space with its crease edges, steps 2 and 3; None if it is not homeomorphic to the surface."""
+    if not controlled.complete:
+        return None
+    cells, creased = controlled.cells, controlled.creased
+    points, faces, simplicial = simplicial_mesh(dual_mesh(cells))
+    if not simplicial:
+        return None
+    space = place_vertices(cells, task.features, controlled.boundary, creased, points, faces)
+    faces = recover_edges(space, faces, creased.paths, task.reference)
+    links = creased.links[np.isin(edge_keys(creased.links), edge_keys(half_edges(faces)))]
+    locked = np.zeros(len(space), dtype=bool)
+    locked[creased.cell[creased.corner][: int(MAX_LOCKED_SHARE * task.n_vertices)]] = True
+    return FeatureMesh(space, faces, links, locked)
+
+
+def _without_inverted(task: MeshingTask, mesh: FeatureMesh) -> FeatureMesh:
+    """Return the mesh with inverted triangles repaired, and the crease edges and locked points that have not moved."""
+    points, faces, _ = untangle(mesh.points, mesh.faces, task.reference, deadline=task.deadline)
+    if points is mesh.points:
+        return FeatureMesh(points, faces, mesh.crease_edges, mesh.locked)
+    places = {point.tobytes(): number for number, point in enumerate(points)}
+    number = np.array([places.get(point.tobytes(), -1) for point in mesh.points], dtype=np.int64)
+    links, locked = number[mesh.crease_edges], np.zeros(len(points), dtype=bool)
+    locked[number[mesh.locked & (number >= 0)]] = True
+    return FeatureMesh(points, faces, links[(links >= 0).all(axis=1)], locked)
+
+
+def _coarsened(task: MeshingTask, mesh: FeatureMesh) -> FeatureMesh:
+    """Return the mesh with no more vertices than asked for, if collapses can do that: step 4."""
+    if len(mesh.points) <= task.n_vertices:
+        return mesh
+    points, faces, links = mesh.points, mesh.faces, mesh.crease_edges
+    if np.count_nonzero(mesh.locked | fixed_by(links, len(points))) <= MAX_FIXED_SHARE * task.n_vertices:
+        points, faces, links = decimate(points, faces, task.n_vertices, task.reference, kept=mesh.locked, creases=links)
+    if len(points) > task.n_vertices:  # fewer than the creases need
+        points, faces, links = decimate(points, faces, task.n_vertices, task.reference)
+    return _without_inverted(task, FeatureMesh(points, faces, links, np.zeros(len(points), dtype=bool)))
+
+
+def _without_crossings(
+    task: MeshingTask, points: Points, faces: Faces, links: EdgeEnds, tries: int
+) -> tuple[Points, Faces]:
+    """Return the mesh without new self-intersections where possible, with no more points than before where possible."""
+    reference = task.reference
+    n_wanted = max(task.n_vertices, len(points))
+    points, faces, crossing = separate(points, faces, reference, max_tries=tries, deadline=task.deadline)
+    for _ in range(_MAX_TRIMS):
+        if len(points) <= n_wanted:
+            break
+        kept = np.arange(len(points)) >= n_wanted
+        points_left, faces_left, links_left = decimate(points, faces, n_wanted, reference, kept=kept, creases=links)
+        coarser = separate(points_left, faces_left, reference, max_tries=_TRIM_TRIES, deadline=task.deadline)
+        if coarser[2] > crossing:
+            break
+        points, faces, crossing = coarser
+        links = links_left
+    return points, faces

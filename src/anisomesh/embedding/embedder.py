@@ -1,0 +1,80 @@
+"""The protocol of embedders, and the direct embedding as one."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any, Protocol
+
+import numpy as np
+
+from anisomesh.embedding.base import Embedding
+from anisomesh.embedding.direct import embed
+from anisomesh.embedding.precomputed import precomputed_embedding
+from anisomesh.errors import OptionError
+from anisomesh.mesh.surface import Surface
+from anisomesh.metric.field import MetricField
+
+
+class Embedder(Protocol):
+    """Anything that embeds a surface so that straight lengths in R^d are lengths in a metric."""
+
+    def __call__(self, surface: Surface, field: MetricField, /) -> Embedding:
+        """Return the embedding of a surface at bounding-box diagonal 1 with a metric at its points."""
+        ...
+
+
+@dataclass(frozen=True, kw_only=True)
+class Direct:
+    """The direct embedding by local and global steps; extra coordinates of the field are used as they are.
+
+    Parameters
+    ----------
+    iterations
+        Largest number of steps, at least 1.
+    extra_dimensions
+        Number of coordinates besides the first three, at least 3.
+    tolerance
+        Stop when a step lowers the residual by less than this part of it.
+
+    References
+    ----------
+    NASM, supplement A; see :func:`~anisomesh.embedding.direct.embed`.
+    """
+
+    iterations: int = 10
+    extra_dimensions: int = 5
+    tolerance: float = 1e-3
+
+    def __call__(self, surface: Surface, field: MetricField) -> Embedding:
+        """Return the embedding of a surface with a metric at its points."""
+        if field.extra is not None:
+            return precomputed_embedding(surface, field.extra, field.tensors)
+        return embed(
+            surface,
+            field.tensors,
+            extra_dimensions=self.extra_dimensions,
+            max_iterations=self.iterations,
+            tolerance=self.tolerance,
+        )
+
+
+def checked_embedding(embedding: Any, surface: Surface) -> Embedding:
+    """Return the result of an embedder for a surface after validation.
+
+    Raises
+    ------
+    OptionError
+        If it is not an :class:`~anisomesh.embedding.base.Embedding`, its points are not finite (V, d) with d >= 3, or
+        the first three columns are not ``scale`` > 0 times the points of the surface.
+    """
+    if not isinstance(embedding, Embedding):
+        raise OptionError(f"the embedder returned {type(embedding).__name__}; expected an Embedding")
+    points, n = np.asarray(embedding.points), surface.n_points
+    if points.ndim != 2 or len(points) != n or points.shape[1] < 3 or not np.isfinite(points).all():
+        raise OptionError(f"the embedding has points of shape {points.shape}; expected finite ({n}, d) with d >= 3")
+    if not embedding.scale > 0.0:
+        raise OptionError(f"the embedding has scale = {embedding.scale}; expected a positive number")
+    off = np.abs(points[:, :3] - embedding.scale * surface.points).max()
+    if off > 1e-9 * embedding.scale * max(surface.diagonal, 1.0):
+        raise OptionError(f"the first three coordinates of the embedding are off scale times the surface by {off:.3g}")
+    return embedding

@@ -1,0 +1,85 @@
+"""All feature polylines of an embedded surface: its boundary loops and its creases."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from anisomesh._arrays import EdgeMask, EmbeddedPoints
+from anisomesh.features.boundary import BoundaryLoops, trace_boundary
+from anisomesh.features.creases import select_creases
+from anisomesh.features.polylines import FeaturePolylines, Floats, Ints
+from anisomesh.mesh.surface import Surface
+
+_CORNER_SCALE = 0.75  # site spacings over which the turn of a boundary is measured; heuristic
+_MAX_CREASE_LENGTH = 1.2  # site spacings of crease for each site; longer networks leave no sites for the faces
+
+
+@dataclass(frozen=True, eq=False)
+class FeatureNetwork:
+    """Boundary loops and creases that the sites of a tessellation follow.
+
+    Attributes
+    ----------
+    boundary
+        Boundary loops.
+    boundary_corners, boundary_turns
+        Segments of the boundary that start at a corner (n,), and the turning angles there (n,) in degrees.
+    creases
+        The creases that sites at ``spacing`` can follow, from corner to corner.
+    spacing
+        Distance between sites in the embedding.
+    sharp
+        All edges of the surface on a crease (E,), followed or not.
+    required
+        Edges that are followed in any case (E,).
+    """
+
+    boundary: BoundaryLoops
+    boundary_corners: Ints
+    boundary_turns: Floats
+    creases: FeaturePolylines
+    spacing: float
+    sharp: EdgeMask
+    required: EdgeMask
+
+    @property
+    def any(self) -> bool:
+        """Whether there is a boundary or a crease."""
+        return self.boundary.n_polylines + self.creases.n_polylines > 0
+
+
+def trace_features(
+    positions: EmbeddedPoints,
+    surface: Surface,
+    n_sites: int,
+    spacing: float,
+    *,
+    sharp: EdgeMask,
+    required: EdgeMask | None = None,
+) -> FeatureNetwork:
+    """Return the feature network of a surface for a number of sites.
+
+    Parameters
+    ----------
+    positions
+        The embedded points (V, d).
+    surface
+        The surface in space.
+    n_sites, spacing
+        Number of sites, and their distance in the embedding.
+    sharp
+        Which edges of the surface (E,) are on a crease.
+    required
+        Which of these (E,) are followed in any case; none by default.
+    """
+    if required is None:
+        required = np.zeros_like(sharp)
+    boundary = trace_boundary(positions, surface)
+    crease_ends = np.unique(surface.edges[sharp]).astype(np.int64)
+    corners, turns = boundary.corners(_CORNER_SCALE * spacing, crease_ends)
+    creases = select_creases(
+        positions, surface, sharp, required=required, spacing=spacing, max_length=_MAX_CREASE_LENGTH * n_sites
+    )
+    return FeatureNetwork(boundary, corners, turns, creases, spacing, sharp, required)

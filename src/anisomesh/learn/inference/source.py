@@ -1,0 +1,84 @@
+"""Metric sources that ask a trained network; torch is imported when they are called."""
+
+from __future__ import annotations
+
+import os
+from dataclasses import dataclass
+
+import numpy as np
+
+from anisomesh._arrays import PointTensors
+from anisomesh.learn import require_torch
+from anisomesh.mesh.surface import Surface
+from anisomesh.metric.curvature import principal_curvatures
+from anisomesh.metric.field import MetricField
+from anisomesh.metric.line_field import line_field_components, principal_stretch, tensors_of_line_field
+from anisomesh.metric.tangent import tangent_frames, unit_normals
+from anisomesh.metric.tensors import curvature_metric
+
+MEASURED_SHARE = 0.7  # of the measured curvature in the hybrid metric; on validation meshes .3 is worse, .85 as good
+
+
+@dataclass(frozen=True)
+class Neural:
+    """The curvature metric, and the surface beneath noise, as a trained network predicts them.
+
+    Parameters
+    ----------
+    weights
+        A file of ``anisomesh train``, or the name of a pretrained network; None for the default one.
+    device
+        ``"cpu"`` or ``"cuda"``.
+    denoise
+        Whether noise that the network finds is removed from the points. ``remesh`` removes none from designed
+        surfaces, on which a tenth of the edges or more are flat.
+
+    References
+    ----------
+    NASM, section 3.2; docs/learning.md for the default network.
+    """
+
+    weights: str | os.PathLike[str] | None = None
+    device: str = "cpu"
+    denoise: bool = True
+
+    def __call__(self, surface: Surface) -> MetricField:
+        """Return the metric at the points of a surface.
+
+        Raises
+        ------
+        WeightsError, LearningError
+            If the network cannot be loaded, or torch is not installed.
+        OptionError
+            If there are no such weights, or the device cannot be used.
+        """
+        require_torch()
+        from anisomesh.learn.inference.predict import predict
+
+        found = predict(surface, self.weights, device=self.device, denoise=self.denoise)
+        points = found.points if found.noise > 0.0 else None
+        return MetricField(tensors=found.tensors, points=points, extra=found.extra, noise=found.noise)
+
+
+@dataclass(frozen=True)
+class Hybrid(Neural):
+    """A mean of the network's metric and the measured one, on the surface without the noise that the network finds.
+
+    Where curvature cannot be measured reliably, the network's metric alone.
+    """
+
+    def __call__(self, surface: Surface) -> MetricField:
+        """Return the metric at the points of a surface; errors as :class:`Neural`."""
+        field = super().__call__(surface)
+        denoised = surface if field.points is None else surface.with_points(field.points)
+        return MetricField(tensors=_blended(denoised, field.tensors), points=field.points, noise=field.noise)
+
+
+def _blended(surface: Surface, predicted: PointTensors) -> PointTensors:
+    """Return the weighted mean, as line fields, of a predicted metric (V, 3, 3) and the measured one."""
+    curvature = principal_curvatures(surface)
+    measured = curvature_metric(surface, curvature)
+    frames = tangent_frames(unit_normals(surface))
+    own, other = (line_field_components(*principal_stretch(tensors), frames) for tensors in (predicted, measured))
+    share = np.where(curvature.trusted, MEASURED_SHARE, 0.0)[:, None]
+    return tensors_of_line_field((1.0 - share) * own + share * other, frames)

@@ -1,0 +1,107 @@
+"""From options, with their short forms, to the objects that the stages take."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import replace
+
+from anisomesh._arrays import PointTensors
+from anisomesh.cvt.energy import Energy, NormalMetric
+from anisomesh.cvt.schedule import CVTOptions
+from anisomesh.embedding.embedder import Direct, Embedder
+from anisomesh.features.detect import share_of_flat_edges
+from anisomesh.learn import torch_is_there
+from anisomesh.learn.inference.source import Hybrid, Neural
+from anisomesh.mesh.surface import Surface
+from anisomesh.metric.field import MetricSource
+from anisomesh.metric.sources import Approximation, Curvature, PrecomputedTensors, Uniform
+from anisomesh.options import RemeshOptions
+
+DESIGNED_SHARE = 0.1
+"""Share of edges between coplanar faces from which on a surface counts as designed, and no noise is removed from it.
+
+Noise turns all edges, so measured surfaces have next to none; machine parts have many.
+"""
+
+_RESAMPLING_FACTOR = 1.5  # sharpness of the energy by which sites are sampled anew, over the sharpness; heuristic
+_BUILT_IN: dict[str, Callable[[], MetricSource]] = {
+    "curvature": Curvature,
+    "approximation": Approximation,
+    "uniform": Uniform,
+}
+
+
+def embedding_name(options: RemeshOptions) -> str:
+    """Return ``"direct"``, ``"neural"`` or ``"hybrid"``, or the name of a metric source of the user."""
+    metric, embedding = options.metric, options.embedding
+    if callable(metric):
+        known = {Hybrid: "hybrid", Neural: "neural", Curvature: "direct", Approximation: "direct", Uniform: "direct"}
+        return known.get(type(metric)) or str(getattr(metric, "__name__", type(metric).__name__))
+    if not isinstance(embedding, str):
+        return "direct"
+    if embedding != "auto":
+        return embedding
+    network = options.weights is not None or torch_is_there()
+    return "hybrid" if network and isinstance(metric, str) and metric == "curvature" else "direct"
+
+
+def metric_source(options: RemeshOptions, surface: Surface, tensors: PointTensors | None) -> MetricSource:
+    """Return the metric source that the options name.
+
+    Parameters
+    ----------
+    options
+        The options.
+    surface
+        The prepared input: noise is never removed from a designed surface.
+    tensors
+        Tensors at the points that the source will be called with (V, 3, 3), if the options prescribe them.
+    """
+    metric, name = options.metric, embedding_name(options)
+    if not callable(metric):
+        if name in ("neural", "hybrid"):
+            network = Hybrid if name == "hybrid" else Neural
+            metric = network(options.weights, options.device, options.denoise)
+        elif tensors is not None:
+            return PrecomputedTensors(tensors)
+        else:
+            return _BUILT_IN[str(metric)]()
+    if isinstance(metric, Neural):
+        denoise = metric.denoise and options.denoise and share_of_flat_edges(surface) < DESIGNED_SHARE
+        return replace(metric, denoise=denoise)
+    return metric
+
+
+def embedder(options: RemeshOptions) -> Embedder:
+    """Return the embedder that the options name."""
+    if isinstance(options.embedding, str):
+        return Direct(iterations=options.embedding_iterations)
+    return options.embedding
+
+
+def energy(options: RemeshOptions) -> Energy:
+    """Return the energy that the options name."""
+    return NormalMetric(options.sharpness) if options.energy is None else options.energy
+
+
+def follows_creases(options: RemeshOptions) -> bool:
+    """Return whether detected creases are followed: always, except with the plain CVT."""
+    return energy(options) != NormalMetric(1.0)
+
+
+def cvt_options(options: RemeshOptions) -> CVTOptions:
+    """Return how sites are optimised."""
+    wanted, final = energy(options), options.final_sharpness
+    resampling: Energy | None = wanted
+    if isinstance(wanted, NormalMetric):
+        plain = wanted.sharpness == 1.0
+        resampling = None if plain else NormalMetric(_RESAMPLING_FACTOR * wanted.sharpness)
+    return CVTOptions(
+        energy=wanted,
+        final_energy=None if final is None else NormalMetric(final),
+        resampling_energy=resampling,
+        relocate=follows_creases(options),
+        lloyd_iterations=options.lloyd_iterations,
+        max_iterations=options.max_iterations,
+        seed=options.seed,
+    )
