@@ -1,4 +1,4 @@
-"""Corners and creases of the machine part made by code, and distances of rocker-arm and fertility.
+"""Corners and creases of the procedural machine part, and distances of rocker-arm and fertility.
 
 Usage: python benchmarks/features.py [--resolution 24]
 """
@@ -18,12 +18,14 @@ from anisomesh.mesh.surface import Surface
 from anisomesh.mesh.topology import edge_keys
 from anisomesh.shapes.analytic import cad_features, cad_part
 
-REACH = 0.1  # of the mean edge length: a point of a crease is covered if an edge of the result is so near
-BEND = 5.0  # and its faces differ by so many degrees at least
+COVERED_DISTANCE = 0.1  # mean edges of the result: crease points this close to a bent edge are covered; heuristic
+MIN_BEND_ANGLE = 5.0  # degrees between the faces of a bent edge; heuristic, below the weak creases of the part
+RESULT_SPACING = 0.02  # mean edges, of points along bent edges of the result; a fifth of COVERED_DISTANCE
+PART_SPACING = 0.1  # mean edges, of points along the creases of the part, whose covered share is counted
 
 
 def edges_between(surface: Surface, ends: np.ndarray) -> np.ndarray:
-    """Return which edges (E,) of a surface join these pairs of points (n, 2)."""
+    """Return which edges (E,) of a surface join given pairs of points (n, 2)."""
     return np.isin(edge_keys(surface.edges), edge_keys(ends))
 
 
@@ -32,12 +34,12 @@ def measure_part(resolution: int, ratio: float, final: float | None) -> str:
     result = anisomesh.remesh(part, ratio=ratio, final_sharpness=final, embedding="direct").surface
     edge = float(result.edge_lengths.mean())
     corner = cKDTree(result.points).query(part.points[features.corners])[0] / edge
-    fine = cKDTree(points_along(result, sharp_edges(result, BEND), 0.02 * edge))
+    fine = cKDTree(points_along(result, sharp_edges(result, MIN_BEND_ANGLE), RESULT_SPACING * edge))
     covered = []
     for weak in (False, True):
         chosen = features.creases[features.weak == weak]
-        distance = fine.query(points_along(part, edges_between(part, chosen), 0.1 * edge))[0]
-        covered.append(float((distance < REACH * edge).mean()))
+        distance = fine.query(points_along(part, edges_between(part, chosen), PART_SPACING * edge))[0]
+        covered.append(float((distance < COVERED_DISTANCE * edge).mean()))
     late = "" if final is None else f", then s = {final:g}"
     return (
         f"| machine part, {part.n_points:,} points, {ratio:.0%}, s = 7{late} | {result.n_points:,} "
@@ -57,12 +59,14 @@ def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--resolution", type=int, default=24, help="edges of the part along a unit of length")
     options = parser.parse_args()
-    print("| run | vertices | farthest corner / mean edge | sharp creases covered | weak creases covered |")
+    print("| run | vertices | farthest corner [mean edges] | sharp creases covered | weak creases covered |")
     print("|---|---|---|---|---|")
     for final in (None, 30.0):
         print(measure_part(options.resolution, 0.2, final), flush=True)
     if "ANISOMESH_DATA" in os.environ:
-        print("\n| run | vertices | largest distance | sum of both mean squared distances |\n|---|---|---|---|")
+        print(
+            "\n| run | vertices | largest distance [D] | sum of both mean squared distances [D²] |\n|---|---|---|---|"
+        )
         for name in ("rocker-arm", "fertility"):
             print(measure_mesh(Path(os.environ["ANISOMESH_DATA"]) / "test" / f"{name}.ply", 0.2), flush=True)
 

@@ -1,10 +1,10 @@
-"""What the command line makes of every mesh of a folder: crashes, refusals, hangs, faults, new intersections.
+"""The command line on every mesh of a folder: crashes, refusals, hangs, faults, new intersections.
 
 Usage: python benchmarks/robustness.py [--ratios 1 0.2 0.1] [--embedding direct] [--only NAME]
        [--folders wild zeroshot test] [--fresh]
 
-Rows are kept in benchmarks/out/robustness.jsonl; a run that was stopped goes on. Exit code 1 if a run crashed, hung,
-printed what it should not, or gave an invalid mesh without saying so.
+Rows are kept in benchmarks/out/robustness.jsonl; a stopped call is resumed by the same command. Exit code 1 if a run
+crashed, hung, printed to stderr, or returned an invalid mesh without a warning.
 """
 
 from __future__ import annotations
@@ -24,13 +24,13 @@ import anisomesh
 from anisomesh.options import EMBEDDINGS
 
 OUT = Path(__file__).parent / "out" / "robustness.jsonl"
-LIMIT = 600  # seconds
-SAME = ("components", "euler", "boundary_loops")  # as in the input
-COUNTS = ("nonmanifold_edges", "nonmanifold_vertices", "flat", "inverted", "duplicate_faces", "new_intersections")
+HANG_SECONDS = 600
+KEPT = ("components", "euler", "boundary_loops")  # keys of the report that have to be as for the input
+FAULTS = ("nonmanifold_edges", "nonmanifold_vertices", "flat", "inverted", "duplicate_faces", "new_intersections")
 
 
 def run(path: Path, ratio: float, embedding: str) -> dict[str, Any]:
-    """Run the command on a mesh and return what it did."""
+    """Run the command on a mesh and return its outcome, with the report of a finished run."""
     with tempfile.TemporaryDirectory() as folder:
         out = Path(folder) / "out.ply"
         words = ["remesh", str(path), "-o", str(out), "--ratio", str(ratio), "--embedding", embedding]
@@ -38,9 +38,9 @@ def run(path: Path, ratio: float, embedding: str) -> dict[str, Any]:
         row: dict[str, Any] = {"mesh": f"{path.parent.name}/{path.name}", "ratio": ratio, "embedding": embedding}
         start = time.perf_counter()
         try:
-            done = subprocess.run(command, capture_output=True, text=True, timeout=LIMIT, check=False)
+            done = subprocess.run(command, capture_output=True, text=True, timeout=HANG_SECONDS, check=False)
         except subprocess.TimeoutExpired:
-            return {**row, "outcome": "hang", "seconds": LIMIT}
+            return {**row, "outcome": "hang", "seconds": HANG_SECONDS}
         row["seconds"] = round(time.perf_counter() - start, 2)
         lines = done.stderr.strip().splitlines()
         if done.returncode == 1 and len(lines) == 1 and not out.exists():
@@ -49,18 +49,24 @@ def run(path: Path, ratio: float, embedding: str) -> dict[str, Any]:
             return {**row, "outcome": "crash", "said": done.stderr[-500:]}
         report = json.loads(done.stdout)
         row |= {key: report[key] for key in ("vertices", "vertices_asked", "validity", "warnings")}
-        row["noise"] = done.stderr.strip()
-        anisomesh.load(out)  # it has to be readable
+        row["stderr"] = done.stderr.strip()
+        anisomesh.load(out)  # the file has to be readable
     return {**row, "outcome": "done"}
 
 
 def faults(row: dict[str, Any]) -> list[str]:
-    """Return what is not valid about a result, in words."""
+    """Return the faults of a result in words."""
     validity = row["validity"]
-    pairs = [(name, validity[name], validity[f"{name}_input"]) for name in SAME]
+    pairs = [(name, validity[name], validity[f"{name}_input"]) for name in KEPT]
     found = [f"{name} {value} for {wanted}" for name, value, wanted in pairs if value != wanted]
-    found += [f"{name} {validity[name]}" for name in COUNTS if validity[name]]
+    found += [f"{name} {validity[name]}" for name in FAULTS if validity[name]]
     return found if validity["oriented"] else [*found, "not oriented"]
+
+
+def read_rows() -> list[dict[str, Any]]:
+    """Return the rows of earlier calls; rows of versions with other names of the figures are left out."""
+    rows = [json.loads(line) for line in OUT.read_text().splitlines()] if OUT.exists() else []
+    return [row for row in rows if "embedding" in row and (row["outcome"] != "done" or "stderr" in row)]
 
 
 def main() -> int:
@@ -69,7 +75,7 @@ def main() -> int:
     parser.add_argument("--embedding", choices=EMBEDDINGS, default="direct")
     parser.add_argument("--folders", nargs="+", default=["wild", "zeroshot", "test"])
     parser.add_argument("--only", default="")
-    parser.add_argument("--fresh", action="store_true", help="forget earlier rows")
+    parser.add_argument("--fresh", action="store_true", help="discard earlier rows")
     arguments = parser.parse_args()
     data = Path(os.environ.get("ANISOMESH_DATA", ""))
     paths = [path for folder in arguments.folders for path in sorted((data / folder).glob("*.*"))]
@@ -80,8 +86,7 @@ def main() -> int:
     OUT.parent.mkdir(exist_ok=True)
     if arguments.fresh:
         OUT.unlink(missing_ok=True)
-    rows = [json.loads(line) for line in OUT.read_text().splitlines()] if OUT.exists() else []
-    known = {(row["mesh"], row["ratio"], row.get("embedding")): row for row in rows}
+    known = {(row["mesh"], row["ratio"], row["embedding"]): row for row in read_rows()}
     chosen = []
     for ratio in arguments.ratios:
         for path in paths:
@@ -100,14 +105,14 @@ def main() -> int:
 
 def _summary(rows: list[dict[str, Any]]) -> int:
     bad = 0
-    print("\n| folder | vertices | runs | refused | crashed | hung | with a fault | without a word | slowest |")
+    print("\n| folder | ratio | runs | refused | crashed | hung | faulty | faulty without warning | slowest |")
     print("|---|---|---|---|---|---|---|---|---|")
     for folder, ratio in dict.fromkeys((row["mesh"].split("/")[0], row["ratio"]) for row in rows):
         group = [row for row in rows if row["mesh"].startswith(folder) and row["ratio"] == ratio]
         count = Counter(row["outcome"] for row in group)
         done = [row for row in group if row["outcome"] == "done"]
         faulty = [row for row in done if faults(row)]
-        silent = [row for row in done if row["noise"] or (faults(row) and not row["warnings"])]
+        silent = [row for row in done if row["stderr"] or (faults(row) and not row["warnings"])]
         bad += count["crash"] + count["hang"] + len(silent)
         slowest = max(row["seconds"] for row in group)
         print(

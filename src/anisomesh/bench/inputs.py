@@ -17,7 +17,7 @@ from anisomesh.shapes.cad_part import cad_part
 
 _RING_POINTS = 5_440  # of the twisted ring with 160 sections of 34 points
 _PART_POINTS = 8_396  # of the machine part at resolution 24
-_TORUS_POINTS = 6_000  # heuristic: about as many as the meshes of the paper
+_TORUS_POINTS = 6_000  # heuristic
 
 
 @dataclass(frozen=True)

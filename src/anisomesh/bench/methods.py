@@ -16,7 +16,7 @@ from anisomesh.mesh.geometry import unit_frame
 from anisomesh.mesh.surface import Surface
 
 _ACVD_POINTS_PER_CLUSTER = 10  # input points per cluster, the advice of pyacvd's documentation
-_MAX_MMG_RUNS = 8  # heuristic: the search has converged by then
+_MAX_MMG_RUNS = 8  # bounds the time; heuristic
 _MMG_COUNT_TOLERANCE = 0.02  # of the requested number of vertices, as the tolerance of anisomesh itself
 _MMG_START_HAUSDORFF = 1e-3  # diagonals; heuristic start of the search
 _MMG_POWERS = (-4.0, -0.25)  # smallest and largest exponent of the vertex count as a power of the size; heuristic
