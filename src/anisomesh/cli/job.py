@@ -145,9 +145,9 @@ def run_remesh(
     """
     from importlib.metadata import version
 
-    from anisomesh.resolve import embedding_name
     from anisomesh.options import RemeshOptions
     from anisomesh.pipeline import remesh
+    from anisomesh.resolve import embedding_name
 
     source = RemeshOptions(**{name: options[name] for name in ("metric", "embedding", "weights") if name in options})
     announce_compilation(display, "remesh", *(() if embedding_name(source) == "direct" else ("network",)))
