@@ -1,6 +1,6 @@
-"""Numerical kernels: Numba only here. Arrays in, arrays out; no state and no import from the package.
+"""Numerical kernels, the only modules that use Numba: arrays in, arrays out, no state, no imports from the package.
 
-Kernels release the GIL and work on a fixed chunk of facets or sites, so that a thread pool can run them and
-the result does not depend on the number of threads. No kernel uses fast-math: the predicates rely on IEEE
-rounding.
+Kernels release the GIL and work on a fixed chunk of facets or sites, so that a thread pool can run them and results do
+not depend on the number of threads. Predicates rely on IEEE rounding: no kernel uses fast-math, except for sums whose
+terms may be reordered (``compiled.summing``).
 """

@@ -1,8 +1,8 @@
-"""How kernels are compiled: machine code cached on disk, without the GIL, without counting references.
+"""Compilation of kernels: machine code cached on disk, without the GIL, without reference counts.
 
-Numba counts references to arrays wherever they are passed on, in atomic operations that its own pass does not remove
-from functions as large as the clipping; without them that takes two thirds of the time. A kernel without them can
-allocate nothing: its arrays all belong to the caller.
+Numba counts references to arrays at every call, in atomic operations that its optimiser does not remove from functions
+as large as the clipping; they take two thirds of the time. A kernel without reference counts cannot allocate: all its
+arrays belong to the caller.
 """
 
 from typing import Any
@@ -16,4 +16,4 @@ _UNCOUNTED: dict[str, Any] = {**_OPTIONS, "_nrt": False}
 kernel = njit(**_UNCOUNTED)
 inlined = njit(**_UNCOUNTED, forceinline=True)
 allocating = njit(**_COUNTED)
-summing = njit(**_UNCOUNTED, fastmath={"reassoc"})  # in any order, so several terms at once
+summing = njit(**_UNCOUNTED, fastmath={"reassoc"})  # terms of sums may be reordered, so vectorised

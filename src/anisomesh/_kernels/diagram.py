@@ -1,4 +1,4 @@
-"""Writing the restricted Voronoi diagram in symbolic form, chunk by chunk."""
+"""The restricted Voronoi diagram in symbolic form, chunk by chunk."""
 
 from .clip import START_TOO_FAR, clip_facet
 from .compiled import kernel
@@ -8,7 +8,8 @@ from .compiled import kernel
 def count_chunk(chunk, owners, facets, sites, ws, problems):
     """Return the numbers of polygons, polygon vertices and problems on a chunk of facets.
 
-    A facet that cannot be clipped is written into ``problems`` (facet, status).
+    ``owners`` (F,) are the start sites; they are updated. A facet that cannot be clipped is written to ``problems`` as
+    (facet, status).
     """
     polygons = 0
     vertices = 0
@@ -30,10 +31,10 @@ def count_chunk(chunk, owners, facets, sites, ws, problems):
 
 @kernel
 def write_chunk(chunk, owners, facets, sites, ws, facet_of, site_of, size, label, vertex):
-    """Write the polygons of a chunk of facets: per polygon facet, site, vertex count; per vertex the rest.
+    """Write the polygons of a chunk of facets: facet, site and vertex count per polygon, label and position per vertex.
 
-    Edge labels are sites, or -1 - c for the side of the facet opposite corner c. Every polygon starts at a
-    canonical vertex, that with the lowest label, so that the output does not depend on the owners.
+    Edge labels are sites, or -1 - c for the side of the facet opposite corner c. Every polygon starts at the vertex
+    with the lowest label, so that the output does not depend on the owners.
     """
     p = 0
     v = 0

@@ -1,4 +1,4 @@
-"""Energy and gradient of the normal-metric CVT, accumulated over the cells on a chunk of facets.
+"""Energy and gradient of the normal-metric CVT (NASM, section 3.3), accumulated over the cells on a chunk of facets.
 
 Per polygon P of site i on a facet (area A, barycentric moments M1, M2, normal N, h_i = N . (v_a - x_i)):
 
@@ -7,10 +7,10 @@ Per polygon P of site i on a facet (area A, barycentric moments M1, M2, normal N
               + sum over bisector edges (i, j), length L, midpoint m:
                 (s^2 - 1) (h_i^2 - h_j^2) L / |P_T (x_j - x_i)| (m - x_i)
 
-The last sum is the motion of the cell boundary: the normal-metric part of the energy jumps across a bisector,
-because the diagram is that of the Euclidean distance. |P_T (x_j - x_i)| is half the in-plane gradient of the
-form l . (W_j - W_i). Every vector is a combination of x_i, the corners and N, so the dimension of the
-embedding enters once per polygon.
+The last sum is the motion of the cell boundaries: the normal part of the energy is discontinuous across a bisector,
+because the diagram is Euclidean. |P_T (x_j - x_i)| is half the gradient, in the facet, of the linear form
+l . (W_j - W_i). All vectors are combinations of x_i, the corners and N, so the dimension of the embedding occurs once
+per polygon.
 """
 
 import numpy as np
@@ -21,7 +21,7 @@ from .compiled import inlined, kernel
 
 @inlined
 def _moments(vertex, start, end):
-    """Return the area fraction, M1 (a, b, c) and M2 (bc, ca, ab) of a polygon."""
+    """Return the area as a fraction of the facet, M1 (a, b, c) and M2 (bc, ca, ab) of a polygon."""
     area = 0.0
     ma = mb = mc = 0.0
     mbc = mca = mab = 0.0
@@ -43,7 +43,7 @@ def _moments(vertex, start, end):
 
 @inlined
 def _height(facets, facet, positions, site):
-    """Return h = N . (v_a - x) of a site over a facet."""
+    """Return h = N . (v_a - x), the signed distance of a site x from the plane of a facet."""
     corner = facets.faces[facet, 0]
     h = 0.0
     for k in range(3):
@@ -60,7 +60,7 @@ def _boundary_motion(ws, k, following, i, j, jump, side2, area):
     length2 = -(db * dc * side2[0] + dc * da * side2[1] + da * db * side2[2])
     p = (ws.table[j, 1] - ws.table[i, 1]) - (ws.table[j, 0] - ws.table[i, 0])
     q = (ws.table[j, 2] - ws.table[i, 2]) - (ws.table[j, 0] - ws.table[i, 0])
-    # 4 area^2 |gradient|^2 from p, q along the sides ab (side2[2]) and ac (side2[1])
+    # 4 area^2 |gradient|^2 from the differences p and q along the sides ab (side2[2]) and ac (side2[1])
     slope2 = p * p * side2[1] - p * q * (side2[1] + side2[2] - side2[0]) + q * q * side2[2]
     if length2 <= 0.0 or slope2 <= 0.0:
         return 0.0
@@ -71,10 +71,10 @@ def _boundary_motion(ws, k, following, i, j, jump, side2, area):
 def integrate_chunk(chunk, owners, facets, sites, ws, sharpness, row_of, touched, accumulated, problems):
     """Integrate over a chunk of facets, given by index.
 
-    Writes, for each site met, its index into ``touched`` and its gradient (d), mass and energy into a row of
-    ``accumulated`` (one row for each polygon at most); ``row_of`` (S,) holds -1 between calls, ``owners`` (F,)
-    are the start sites, updated. A facet that cannot be clipped is skipped and written into ``problems``
-    (facet, status). Returns the number of sites met and the number of problems.
+    For each site with a polygon, writes its index to ``touched``, and its gradient (d), mass and energy to a row of
+    ``accumulated`` (at most one row per polygon). ``row_of`` (S,) is -1 between calls; ``owners`` (F,) are the start
+    sites and are updated. A facet that cannot be clipped is skipped and written to ``problems`` as (facet, status).
+    Returns the number of sites with a polygon and the number of problems.
     """
     dimension = sites.positions.shape[1]
     extra = sharpness * sharpness - 1.0
@@ -105,8 +105,8 @@ def integrate_chunk(chunk, owners, facets, sites, ws, sharpness, row_of, touched
                 for k in range(dimension + 2):
                     accumulated[row, k] = 0.0
                 n_touched += 1
-            share, ma, mb, mc, mbc, mca, mab = _moments(ws.vertex, start, stop)
-            mass = area * share
+            fraction, ma, mb, mc, mbc, mca, mab = _moments(ws.vertex, start, stop)
+            mass = area * fraction
             energy = area * (
                 (ws.table[i, 0] * ma + ws.table[i, 1] * mb + ws.table[i, 2] * mc)
                 - (side2[0] * mbc + side2[1] * mca + side2[2] * mab)

@@ -1,13 +1,14 @@
-"""Which triangles intersect: a tree of boxes to find candidates, exact orientations to decide.
+"""Intersecting triangles of a mesh: candidates from a tree of boxes, decided by exact orientations.
 
-A face is a row of three indices into points without two alike, so faces share a point where they share an index.
-Every decision is the exact sign of an orientation determinant (``_kernels.orientation``).
+A face is a row of three distinct indices into points, so faces share a point if and only if they share an index. Every
+decision is the exact sign of an orientation determinant (module orientation).
 
-Triangles whose planes differ are compared by the sides of these planes that their corners lie on, and by how their
-edges pass the edges of the other (Guigue and Devillers 2003); triangles in one plane after dropping a coordinate.
+Triangles in different planes are compared by the sides of these planes on which their corners lie, and by the sides on
+which their edges pass each other (Guigue and Devillers, "Fast and robust triangle-triangle overlap test using
+orientation predicates", 2003); coplanar triangles after projection along a coordinate axis.
 
-The tree is complete: node m of level l holds the faces from ``n m >> l`` to ``n (m + 1) >> l`` of the n in its order,
-and stands at place ``2**l - 1 + m``.
+The tree is complete: node m of level l has the faces from ``n m >> l`` to ``n (m + 1) >> l`` of the n faces in its
+order, and is row ``2**l - 1 + m`` of ``nodes``.
 """
 
 import numpy as np
@@ -18,7 +19,7 @@ from .orientation import orient2d, orient3d
 
 @kernel
 def _outside_an_edge(points, axis, a, b, c, p, q, r):
-    """Return whether, seen along the axis, p, q and r lie strictly outside one of the edges of the triangle a b c."""
+    """Return whether p, q and r, projected along the axis, are all strictly outside one edge of the triangle a b c."""
     inside = orient2d(points, axis, a, b, c)
     for _ in range(3):
         if (
@@ -33,14 +34,14 @@ def _outside_an_edge(points, axis, a, b, c, p, q, r):
 
 @kernel
 def _within_wedge(points, axis, v, p, q, r):
-    """Return whether, seen along the axis, the closed wedge at v from p to q, less than a half-plane, holds r."""
+    """Return whether r, projected along the axis, is in the closed wedge at v from p to q, less than a half-plane."""
     turn = orient2d(points, axis, v, p, q)
     return orient2d(points, axis, v, p, r) * turn >= 0 and orient2d(points, axis, v, r, q) * turn >= 0
 
 
 @kernel
 def _passes(points, u, v, side_u, side_v, x, y, z):
-    """Return whether the segment u v meets the triangle x y z, not in its plane; given the sides of that plane."""
+    """Return whether the segment u v, not coplanar, meets the triangle x y z, from the sides of its plane."""
     if side_u * side_v > 0 or (side_u == 0 and side_v == 0):
         return False
     xy = orient3d(points, u, v, x, y)
@@ -53,12 +54,12 @@ def _passes(points, u, v, side_u, side_v, x, y, z):
 
 @kernel
 def _disjoint_meet(points, axis, a, b, c, p, q, r):
-    """Return whether two triangles without a common corner meet; the axis is that of the first one.
+    """Return whether two triangles without a common corner meet; ``axis`` is the projection axis of the first.
 
-    In one plane, triangles are apart if and only if an edge of one has the other outside (their Minkowski difference
-    is convex, its edges are parallel to theirs). In different planes they meet along a part of the line of the two
-    planes; an end of it is on an edge of one that passes the other or, where that edge lies in the plane of the
-    other, on an edge next to it that does not.
+    Coplanar triangles are disjoint if and only if one is outside an edge of the other (their Minkowski difference is
+    convex, with edges parallel to theirs). Triangles in different planes meet in a segment on the intersection line of
+    the planes. An end of it is on an edge of one triangle that meets the other or, if that edge is in the plane of the
+    other, on an adjacent edge that is not.
     """
     side_a = orient3d(points, p, q, r, a)
     side_b = orient3d(points, p, q, r, b)
@@ -86,10 +87,10 @@ def _disjoint_meet(points, axis, a, b, c, p, q, r):
 
 @kernel
 def _meet_beside_corner(points, axis, v, p, q, r, s):
-    """Return whether triangles v p q and v r s meet in more than v; the axis is that of the first one.
+    """Return whether triangles v p q and v r s meet in more than v; ``axis`` is the projection axis of the first.
 
-    If they meet in another point, they meet along the ray to it from v until it leaves one of them: then p q meets
-    the triangle v r s, or r s the triangle v p q. In one plane, an edge at v of one is within the wedge of the other.
+    If they meet in another point, they meet along the ray from v through it up to the boundary of one of them: p q
+    meets the triangle v r s, or r s the triangle v p q. If coplanar, an edge at v of one is in the wedge of the other.
     """
     side_p = orient3d(points, v, r, s, p)
     side_q = orient3d(points, v, r, s, q)
@@ -106,14 +107,14 @@ def _meet_beside_corner(points, axis, v, p, q, r, s):
     side_s = orient3d(points, v, p, q, s)
     if side_r * side_s > 0:
         return False
-    # the line p q passes v r and s v as side_r and -side_s tell, and the line r s passes v p and q v likewise
+    # side_r and -side_s tell how the line p q passes v r and s v; side_p and -side_q how r s passes v p and q v
     passing = orient3d(points, p, q, r, s)
     return passing * (side_r - side_s) >= 0 or passing * (side_p - side_q) >= 0
 
 
 @kernel
 def faces_intersect(points, faces, axes, i, j):
-    """Return whether faces i and j, which have an area, meet in more than the corners and the edge they share."""
+    """Return whether two nondegenerate faces i and j meet in more than their common corners or edge."""
     shared = 0
     sum_i = 0
     sum_j = 0
@@ -151,7 +152,7 @@ def faces_intersect(points, faces, axes, i, j):
 
 @inlined
 def _select(keys, axis, order, first, last, middle):
-    """Partition ``order[first:last]`` by the keys of one axis about the one whose rank is ``middle``."""
+    """Partition ``order[first:last]`` about the key of rank ``middle`` along one axis (quickselect, Hoare 1961)."""
     low = first
     high = last - 1
     while low < high:
@@ -177,7 +178,7 @@ def _select(keys, axis, order, first, last, middle):
 
 @kernel
 def sort_into_tree(centres, order, depth):
-    """Permute ``order`` (n,) so that every node of the tree halves its centres (n, 3) along the axis of most spread."""
+    """Permute ``order`` (n,) so that each node splits its centres (n, 3) at the median of the widest axis."""
     n = len(order)
     for level in range(depth):
         for node in range(1 << level):
@@ -199,7 +200,7 @@ def sort_into_tree(centres, order, depth):
 
 @inlined
 def _overlap(boxes, i, others, j):
-    """Return whether two closed boxes, each a row of lower and upper bounds, have a point in common."""
+    """Return whether two closed boxes, each a row of three lower and three upper bounds, intersect."""
     return (
         boxes[i, 0] <= others[j, 3]
         and others[j, 0] <= boxes[i, 3]
@@ -211,30 +212,30 @@ def _overlap(boxes, i, others, j):
 
 
 @inlined
-def _beside(points, faces, i, slabs, j):
-    """Return whether face i lies outside the slab of face j, which is a direction, a lower and an upper bound."""
-    least = np.inf
-    most = -np.inf
+def _outside_slab(points, faces, i, slabs, j):
+    """Return whether face i is outside the slab of face j: a direction, a lower and an upper bound along it."""
+    lowest = np.inf
+    highest = -np.inf
     for c in range(3):
         p = faces[i, c]
         height = points[p, 0] * slabs[j, 0] + points[p, 1] * slabs[j, 1] + points[p, 2] * slabs[j, 2]
-        least = min(least, height)
-        most = max(most, height)
-    return least > slabs[j, 4] or most < slabs[j, 3]
+        lowest = min(lowest, height)
+        highest = max(highest, height)
+    return lowest > slabs[j, 4] or highest < slabs[j, 3]
 
 
 @kernel
 def find_pairs(begin, points, faces, axes, boxes, slabs, nodes, depth, stack, pairs):
-    """Write the pairs of faces that intersect as rows of ``pairs``, from face ``begin`` on, as long as there is room.
+    """Write the intersecting pairs of faces, from face ``begin`` on, as rows of ``pairs`` until it is full.
 
-    Faces (F, 3), axes (F,), boxes (F, 6) and slabs (F, 5) are in the order of the tree, ``nodes`` are its boxes. Every
-    pair is found from the face that comes first. ``stack`` (depth + 2, 2) is a workspace.
+    Faces (F, 3), axes (F,), boxes (F, 6) and slabs (F, 5) are in the order of the tree; ``nodes`` are its boxes. A pair
+    is found from its lower face. ``stack`` (depth + 2, 2) is a workspace.
 
     Returns
     -------
     tuple
-        The face to go on from, F at the end, and the number of pairs written. With room for F pairs at least one
-        face is dealt with.
+        The face at which to continue, F at the end, and the number of pairs written. With F rows at least one face is
+        completed.
     """
     n = len(faces)
     written = 0
@@ -259,7 +260,7 @@ def find_pairs(begin, points, faces, axes, boxes, slabs, nodes, depth, stack, pa
             for other in range(max((n * node) >> level, face + 1), last):
                 if (
                     _overlap(boxes, face, boxes, other)
-                    and not _beside(points, faces, other, slabs, face)
+                    and not _outside_slab(points, faces, other, slabs, face)
                     and faces_intersect(points, faces, axes, face, other)
                 ):
                     if written == len(pairs):

@@ -1,4 +1,4 @@
-"""The local step of the direct embedding: the orthonormal part of linear maps from a plane, in closed form."""
+"""The local step of the direct embedding: polar factors of linear maps from a plane, in closed form."""
 
 from __future__ import annotations
 
@@ -12,12 +12,12 @@ from anisomesh._kernels.compiled import allocating, inlined
 Maps = npt.NDArray[np.float64]
 Vector = npt.NDArray[np.float64]
 
-_DEFICIENT = 1e-10
+_MIN_POLAR_LENGTH = 1e-10  # image of a direction over norm of the map, below which the rank is deficient; heuristic
 
 
 @inlined
 def _turn(aa: float, bb: float, ab: float) -> tuple[float, float]:
-    """Return cosine and sine of half the angle of (aa - bb, 2 ab), without loss where either is small."""
+    """Return cosine and sine of half the angle of (aa - bb, 2 ab), without cancellation."""
     difference, twice = aa - bb, 2.0 * ab
     length = math.sqrt(difference * difference + twice * twice)
     if length == 0.0:
@@ -30,13 +30,13 @@ def _turn(aa: float, bb: float, ab: float) -> tuple[float, float]:
 
 
 @inlined
-def _normalise(vector: Vector, least: float) -> bool:
-    """Divide a vector by its length; return False, and leave it, if that is not above the least one."""
+def _normalise(vector: Vector, minimum: float) -> bool:
+    """Divide a vector by its length; return False and leave it unchanged if the length is at most ``minimum``."""
     square = 0.0
     for x in vector:
         square += x * x
     length = math.sqrt(square)
-    if length <= least:
+    if length <= minimum:
         return False
     for c in range(len(vector)):
         vector[c] /= length
@@ -45,7 +45,7 @@ def _normalise(vector: Vector, least: float) -> bool:
 
 @inlined
 def _write_perpendicular(vector: Vector, planes: Maps, f: int, out: Vector) -> None:
-    """Write the unit vector perpendicular to another one nearest to plane f of (F, 2, k); zero if there is no plane."""
+    """Write a unit vector across ``vector`` and closest to plane f of (F, 2, k); zero without a plane."""
     best = 0.0
     out[:] = 0.0
     for row in range(2):
@@ -62,7 +62,7 @@ def _write_perpendicular(vector: Vector, planes: Maps, f: int, out: Vector) -> N
 
 @inlined
 def _write_polar(maps: Maps, fallback: Maps, f: int, first: Vector, second: Vector, out: Maps) -> None:
-    """Write the polar factor of map f of (F, 2, k) to out (2, k); first and second are room (k,)."""
+    """Write the polar factor of map f of (F, 2, k) to out (2, k); ``first`` and ``second`` (k,) are workspace."""
     k = len(first)
     aa, bb, ab = 0.0, 0.0, 0.0
     for c in range(k):
@@ -70,11 +70,11 @@ def _write_polar(maps: Maps, fallback: Maps, f: int, first: Vector, second: Vect
         bb += maps[f, 1, c] * maps[f, 1, c]
         ab += maps[f, 0, c] * maps[f, 1, c]
     cosine, sine = _turn(aa, bb, ab)
-    least = _DEFICIENT * math.sqrt(aa + bb)
+    minimum = _MIN_POLAR_LENGTH * math.sqrt(aa + bb)
     for c in range(k):
         first[c] = cosine * maps[f, 0, c] + sine * maps[f, 1, c]
         second[c] = cosine * maps[f, 1, c] - sine * maps[f, 0, c]
-    if not _normalise(first, least):
+    if not _normalise(first, minimum):
         for c in range(k):
             first[c] = cosine * fallback[f, 0, c] + sine * fallback[f, 1, c]
     along = 0.0
@@ -82,7 +82,7 @@ def _write_polar(maps: Maps, fallback: Maps, f: int, first: Vector, second: Vect
         along += first[c] * second[c]
     for c in range(k):
         second[c] -= along * first[c]
-    if not _normalise(second, least):
+    if not _normalise(second, minimum):
         _write_perpendicular(first, fallback, f, second)
     for c in range(k):
         out[0, c] = cosine * first[c] - sine * second[c]
@@ -91,33 +91,36 @@ def _write_polar(maps: Maps, fallback: Maps, f: int, first: Vector, second: Vect
 
 @allocating
 def local_step(jacobian: Maps, root: Maps, frames: Maps, areas: Vector, target: Maps) -> float:
-    """Write the wanted gradient of each face, turned to the current one, and return the squared distance to it.
+    """Write the target gradients, rotated to the current ones, and return the squared distance to them.
 
     Parameters
     ----------
     jacobian
         Gradients of the extra coordinates in the frames of the faces (F, 2, k), k >= 3.
     root
-        Symmetric tensors S (F, 2, 2): a gradient has the wanted lengths if it is S times one with orthonormal rows.
+        Symmetric tensors S (F, 2, 2); a gradient induces the target metric if it is S times orthonormal rows.
     frames
-        Orthonormal vectors in the plane of each face (F, 2, 3): where they are in the first three dimensions is taken
-        for what a gradient of lower rank leaves open.
+        Orthonormal vectors in the plane of each face (F, 2, 3): their directions in the first three dimensions
+        complete gradients of deficient rank.
     areas
-        Of the faces (F,).
+        Areas of the faces (F,).
     target
-        Room for the result (F, 2, k): S times the polar factor of S times the gradient.
+        Output (F, 2, k): S times the polar factor of S times the gradient.
 
     Returns
     -------
     float
-        The sum of the squared differences of gradient and target, times the areas.
+        Sum over the faces of area times squared Frobenius norm of gradient minus target.
 
     Notes
     -----
-    The polar factor of a map from a plane is the nearest map with orthonormal rows. The frame is turned so that the two
-    images are perpendicular (by half the angle of (aa - bb, 2 ab), a and b the images), they are divided by their
-    lengths, and the frame is turned back. The shorter image is made perpendicular to the longer once more before, since
-    rounding could tilt it.
+    The polar factor of a map from a plane is the closest map with orthonormal rows. The frame is rotated until its
+    images a, b are perpendicular (by half the angle of (aa - bb, 2 ab)), the images are normalised, and the frame is
+    rotated back. Before, the shorter image is made perpendicular to the longer one again, against rounding.
+
+    References
+    ----------
+    NASM, supplement A; Sorkine, Alexa, "As-rigid-as-possible surface modeling", 2007.
     """
     k = jacobian.shape[2]
     product, plane, factor = np.empty((1, 2, k)), np.zeros((1, 2, k)), np.empty((2, k))

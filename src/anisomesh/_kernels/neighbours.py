@@ -1,4 +1,4 @@
-"""Keeping neighbour lists almost sorted while the sites move (lists after Verlet 1967)."""
+"""Neighbour lists of moving sites, kept almost sorted (Verlet, "Computer experiments on classical fluids", 1967)."""
 
 import numpy as np
 
@@ -7,7 +7,7 @@ from .compiled import inlined, kernel
 
 @kernel
 def displacements(positions, reference, moved):
-    """Write how far each site has moved from its reference; return the largest of these lengths."""
+    """Write the distance of each site from its reference position; return the largest distance."""
     farthest = 0.0
     for site in range(positions.shape[0]):
         d2 = 0.0
@@ -21,10 +21,10 @@ def displacements(positions, reference, moved):
 
 @inlined
 def _refresh(site, positions, start, count, neighbours, distance):
-    """Recompute the distances of a list and sort it by them.
+    """Recompute the distances of a list and sort it.
 
-    Insertion sort: the list is almost sorted from the last time. Ties keep the order of the site index, so
-    the result does not depend on the history.
+    Insertion sort, as the list is almost sorted. Equal distances are sorted by site index, so that the result does not
+    depend on the history.
     """
     first = start[site]
     for k in range(first, first + count[site]):
@@ -45,7 +45,7 @@ def _refresh(site, positions, start, count, neighbours, distance):
 
 @kernel
 def refresh_lists(which, positions, start, count, neighbours, distance, stale):
-    """Recompute and sort the lists of these sites."""
+    """Recompute and sort the lists of some sites (n,)."""
     for site in which:
         _refresh(site, positions, start, count, neighbours, distance)
         stale[site] = 0.0
@@ -53,9 +53,9 @@ def refresh_lists(which, positions, start, count, neighbours, distance, stale):
 
 @kernel
 def age_lists(which, steps, limit, positions, start, count, neighbours, distance, stale):
-    """Add to ``stale`` by how much steps of these lengths (S,) may have changed the distances in each list.
+    """Add to ``stale`` (S,) the bound on the change of the distances in each list by steps of known lengths (S,).
 
-    Lists for which that has become more than the limit (S,) are recomputed.
+    Lists whose bound exceeds the limit (S,) are recomputed.
     """
     for site in which:
         farthest = 0.0
@@ -69,10 +69,10 @@ def age_lists(which, steps, limit, positions, start, count, neighbours, distance
 
 @kernel
 def limit_radius(start, count, neighbours, distance, index, radius):
-    """Lower the radius of each site to the distance of the nearest probe that its list does not hold.
+    """Lower the radius of each site to the distance of the nearest probe that is missing in its list.
 
-    ``distance`` and ``index`` (S, k) are probes in order of distance, index -1 for none. If a list holds all
-    probes, the distance of the last bounds that of the next one.
+    ``distance`` and ``index`` (S, k) are the k nearest sites in order of distance, index -1 for none. If a list has all
+    of them, the distance of the last is a bound for the next.
     """
     for site in range(radius.shape[0]):
         for p in range(index.shape[1]):
@@ -81,23 +81,23 @@ def limit_radius(start, count, neighbours, distance, index, radius):
                 break
             if other == site:
                 continue
-            held = False
+            listed = False
             for k in range(start[site], start[site] + count[site]):
                 if neighbours[k] == other:
-                    held = True
+                    listed = True
                     break
-            if not held or p == index.shape[1] - 1:
+            if not listed or p == index.shape[1] - 1:
                 radius[site] = distance[site, p]
                 break
 
 
 @kernel
 def walk(queries, owner, positions, start, count, neighbours):
-    """Move the owner of each query (n, d) to a neighbour that is nearer, until none is; ties go to the larger index."""
+    """Move the owner of each query (n, d) to the closest neighbour until none is closer; the larger index wins ties."""
     dimension = positions.shape[1]
     for q in range(len(queries)):
         nearest = owner[q]
-        least = np.inf
+        lowest = np.inf
         before = np.int64(-1)
         while before != nearest:
             before = nearest
@@ -107,7 +107,7 @@ def walk(queries, owner, positions, start, count, neighbours):
                 for c in range(dimension):
                     t = queries[q, c] - positions[other, c]
                     d2 += t * t
-                if d2 < least or (d2 == least and other > nearest):
-                    least = d2
+                if d2 < lowest or (d2 == lowest and other > nearest):
+                    lowest = d2
                     nearest = other
         owner[q] = nearest

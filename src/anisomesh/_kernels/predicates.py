@@ -1,29 +1,30 @@
-"""Exact signs for the lower envelope of planes over a triangle, with symbolic perturbation.
+"""Exact predicates for the lower envelope of planes over a triangle, with symbolic perturbation.
 
-On a facet with corners a, b, c the squared distance to site i differs from a common quadratic by the linear
-function ``l . W_i``, where ``l`` are barycentric coordinates and ``W_i`` the squared distances from the site
-to the three corners. Site j takes the point l from site i where ``l . (W_j - W_i) < 0``. Every decision of the
-clipping is the sign of such a form at a vertex that is itself given by two lines, that is the sign of a
-determinant of 1, 2 or 3 rows ``W_m - W_i``. The table W is rounded once; from then on everything is exact:
-products are expanded into sums of doubles without error (Dekker 1971) and summed as expansions
-(Shewchuk 1997).
+On a facet with corners a, b, c the squared distance to site i differs from a common quadratic by the linear function
+``l . W_i``, with barycentric coordinates ``l`` and the squared distances ``W_i`` from the site to the corners. Point l
+belongs to site j rather than i where ``l . (W_j - W_i) < 0``. Every decision of the clipping is the sign of such a form
+at a vertex that is the intersection of two lines, so the sign of a determinant of 1, 2 or 3 rows ``W_m - W_i``. The
+table W is rounded once; everything else is exact: products are expanded into sums of doubles without error (Dekker, "A
+floating-point technique for extending the available precision", 1971) and summed as expansions (Shewchuk 1997).
 
-Ties are broken by adding to the three entries of ``W_m`` an infinitesimal that shrinks as the index m grows
-(Edelsbrunner and Muecke 1990). The same amount at all corners is a perturbation of the power weight of the
-site, hence the same on every facet: the diagram is consistent over the whole surface.
+Ties are broken by an infinitesimal added to the three entries of ``W_m``, which decreases with the index m
+(Edelsbrunner and Muecke, "Simulation of simplicity", 1990). The same amount at all corners perturbs the power weight of
+the site, so it is the same on every facet: the diagram is consistent over the whole surface.
 """
 
 import numpy as np
 
 from .compiled import allocating, inlined
 
-_SPLITTER = 134217729.0  # 2**27 + 1
-_MAX_TERMS = 128
+UNIT_ROUNDOFF = 1.1102230246251565e-16  # 2**-53
+
+_SPLITTER = 134217729.0  # 2**27 + 1, halves the bits of a double (Dekker)
+_MAX_TERMS = 128  # of a sum; interior_side has 4 determinants of 6 triple products of 4 terms, 96
 
 
 @inlined
 def _two_product(a, b):
-    """Return p, e with p + e = a * b exactly."""
+    """Return the rounded product p and its error e, so that p + e = a * b exactly."""
     p = a * b
     t = _SPLITTER * a
     a_high = t - (t - a)
@@ -36,7 +37,7 @@ def _two_product(a, b):
 
 @allocating
 def sign_of_sum(terms, n):
-    """Return the exact sign (-1, 0, 1) of the sum of the first n entries of an array of doubles."""
+    """Return the exact sign (-1, 0, 1) of the sum of the first n terms, by growing an expansion (Shewchuk)."""
     expansion = np.empty(_MAX_TERMS + 1)
     length = 0
     for k in range(n):
@@ -61,7 +62,8 @@ def sign_of_sum(terms, n):
 
 
 @allocating
-def _add_product(terms, n, a, b, sign):
+def add_product(terms, n, a, b, sign):
+    """Append the two terms of sign * a * b; return the number of terms."""
     p, e = _two_product(a, b)
     terms[n] = sign * p
     terms[n + 1] = sign * e
@@ -69,29 +71,31 @@ def _add_product(terms, n, a, b, sign):
 
 
 @allocating
-def _add_triple(terms, n, a, b, c, sign):
+def _add_triple_product(terms, n, a, b, c, sign):
+    """Append the four terms of sign * a * b * c; return the number of terms."""
     p, e = _two_product(a, b)
-    n = _add_product(terms, n, p, c, sign)
-    return _add_product(terms, n, e, c, sign)
+    n = add_product(terms, n, p, c, sign)
+    return add_product(terms, n, e, c, sign)
 
 
 @allocating
-def _add_determinant(terms, n, p, q, r, sign):
-    n = _add_triple(terms, n, p[0], q[1], r[2], sign)
-    n = _add_triple(terms, n, p[0], q[2], r[1], -sign)
-    n = _add_triple(terms, n, p[1], q[2], r[0], sign)
-    n = _add_triple(terms, n, p[1], q[0], r[2], -sign)
-    n = _add_triple(terms, n, p[2], q[0], r[1], sign)
-    return _add_triple(terms, n, p[2], q[1], r[0], -sign)
+def add_determinant(terms, n, p, q, r, sign):
+    """Append the 24 terms of sign * det(p, q, r); return the number of terms."""
+    n = _add_triple_product(terms, n, p[0], q[1], r[2], sign)
+    n = _add_triple_product(terms, n, p[0], q[2], r[1], -sign)
+    n = _add_triple_product(terms, n, p[1], q[2], r[0], sign)
+    n = _add_triple_product(terms, n, p[1], q[0], r[2], -sign)
+    n = _add_triple_product(terms, n, p[2], q[0], r[1], sign)
+    return _add_triple_product(terms, n, p[2], q[1], r[0], -sign)
 
 
 @allocating
 def _add_cross_sum(terms, n, p, q):
-    """Append the terms of (1, 1, 1) . (p x q)."""
+    """Append the 12 terms of (1, 1, 1) . (p x q); return the number of terms."""
     for k in range(3):
         m = (k + 1) % 3
-        n = _add_product(terms, n, p[k], q[m], 1.0)
-        n = _add_product(terms, n, p[m], q[k], -1.0)
+        n = add_product(terms, n, p[k], q[m], 1.0)
+        n = add_product(terms, n, p[m], q[k], -1.0)
     return n
 
 
@@ -118,7 +122,7 @@ def _slope_sign(p, q, a, b):
 
 @allocating
 def corner_side(w_i, w_j, index_i, index_j, corner):
-    """Return 1 if site i owns this corner against site j, else -1."""
+    """Return 1 if the corner belongs to site i, -1 if to site j."""
     if w_i[corner] != w_j[corner]:
         return 1 if w_i[corner] < w_j[corner] else -1
     return 1 if index_i > index_j else -1
@@ -126,17 +130,17 @@ def corner_side(w_i, w_j, index_i, index_j, corner):
 
 @allocating
 def edge_side(w_i, w_k, w_j, index_i, index_k, index_j, a, b):
-    """Return 1 if i owns, against j, the point where the bisector of i and k meets side (a, b), else -1.
+    """Return 1 if the intersection of side (a, b) with the bisector of i and k belongs to i, -1 if to j.
 
-    The point must exist: the bisector separates the two corners.
+    The intersection must exist: the bisector separates the two corners.
     """
     terms = np.empty(12)
-    n = _add_product(terms, 0, w_j[a], w_k[b], 1.0)
-    n = _add_product(terms, n, w_j[a], w_i[b], -1.0)
-    n = _add_product(terms, n, w_i[a], w_k[b], -1.0)
-    n = _add_product(terms, n, w_j[b], w_k[a], -1.0)
-    n = _add_product(terms, n, w_j[b], w_i[a], 1.0)
-    n = _add_product(terms, n, w_i[b], w_k[a], 1.0)
+    n = add_product(terms, 0, w_j[a], w_k[b], 1.0)
+    n = add_product(terms, n, w_j[a], w_i[b], -1.0)
+    n = add_product(terms, n, w_i[a], w_k[b], -1.0)
+    n = add_product(terms, n, w_j[b], w_k[a], -1.0)
+    n = add_product(terms, n, w_j[b], w_i[a], 1.0)
+    n = add_product(terms, n, w_i[b], w_k[a], 1.0)
     slope_k = _slope_sign(w_k, w_i, a, b)
     sign = sign_of_sum(terms, n)
     if sign == 0:
@@ -148,12 +152,12 @@ def edge_side(w_i, w_k, w_j, index_i, index_k, index_j, a, b):
 
 @allocating
 def interior_side(w_i, w_k, w_l, w_j, index_i, index_k, index_l, index_j):
-    """Return 1 if i owns, against j, the point common to the cells of i, k and l, else -1."""
+    """Return 1 if the common point of the cells of i, k and l belongs to i, -1 if to j."""
     terms = np.empty(_MAX_TERMS)
-    n = _add_determinant(terms, 0, w_k, w_l, w_j, 1.0)
-    n = _add_determinant(terms, n, w_i, w_l, w_j, -1.0)
-    n = _add_determinant(terms, n, w_k, w_i, w_j, -1.0)
-    n = _add_determinant(terms, n, w_k, w_l, w_i, -1.0)
+    n = add_determinant(terms, 0, w_k, w_l, w_j, 1.0)
+    n = add_determinant(terms, n, w_i, w_l, w_j, -1.0)
+    n = add_determinant(terms, n, w_k, w_i, w_j, -1.0)
+    n = add_determinant(terms, n, w_k, w_l, w_i, -1.0)
     orientation = cross_sum_sign(w_k, w_l, w_i)
     sign = sign_of_sum(terms, n)
     if sign == 0:
@@ -172,7 +176,7 @@ def interior_side(w_i, w_k, w_l, w_j, index_i, index_k, index_l, index_j):
 
 @allocating
 def _first_by_index(i, sign_i, j, sign_j, k, sign_k, m, sign_m):
-    """Return the first non-zero sign in the order of the indices; index -1 stands for "not there"."""
+    """Return the first non-zero sign in increasing order of the indices; an index of -1 is skipped."""
     last = -1
     while True:
         best = -1

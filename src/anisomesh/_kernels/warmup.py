@@ -1,4 +1,4 @@
-"""Whether the kernels still have to be compiled."""
+"""Entry points of the kernels, and whether they are compiled."""
 
 from __future__ import annotations
 
@@ -46,12 +46,12 @@ _TRAIN = (
 )
 _EVALUATE = (orientation.choose_axes, intersections.sort_into_tree, intersections.find_pairs)
 ENTRY_POINTS = {"remesh": _REMESH, "evaluate": _EVALUATE, "network": _NETWORK, "train": _TRAIN}
-"""What each kind of work calls."""
+"""Kernels that each command calls."""
 
 
 def kernels_cached(work: str = "remesh") -> bool:
-    """Return whether every kernel of this work is on disk as compiled code newer than its source, or none is needed."""
-    if not hasattr(integrate.gather, "py_func"):  # compilation is switched off
+    """Return whether all kernels of a command are cached on disk and newer than their source, or compilation is off."""
+    if not hasattr(integrate.gather, "py_func"):  # NUMBA_DISABLE_JIT
         return True
     for kernel in ENTRY_POINTS[work]:
         function = kernel.py_func

@@ -208,7 +208,7 @@ class _Buffers:
         candidates = min(n_sites, 8 * size)
         vertices = 64 * size
         self.workspace = clip.Workspace(
-            clock=np.zeros(2, dtype=np.int64),
+            counter=np.zeros(2, dtype=np.int64),
             stamp=np.zeros(n_sites, dtype=np.int64),
             slot=np.zeros(n_sites, dtype=np.int32),
             candidate=np.zeros(candidates, dtype=np.int32),
