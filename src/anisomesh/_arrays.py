@@ -1,8 +1,8 @@
-"""Array aliases with shapes: the one place where they are defined.
+"""Array types with their shapes.
 
-Letters: ``V`` points, ``F`` faces, ``E`` edges, ``S`` sites, ``P`` polygons, ``d`` dimension of the
-embedding. Geometry is float64, indices are int32 and -1 stands for "none". The aliases document shapes
-for the reader; type checkers see plain NumPy arrays.
+``V`` is the number of points, ``F`` of faces, ``E`` of edges, ``S`` of sites; ``d`` is the dimension of the embedding.
+Geometry is float64; indices are int32, and -1 means "none". The shapes are documentation: type checkers see plain
+NumPy arrays.
 """
 
 import numpy as np

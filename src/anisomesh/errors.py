@@ -1,12 +1,12 @@
-"""The exceptions anisomesh raises on purpose: all derive from :class:`AnisomeshError`.
+"""Exceptions, all derived from :class:`AnisomeshError`.
 
-A message says what is wrong, where, the offending value, what was expected and what to do about it. The
-command line prints it as one line and exits with status 1.
+A message says what is wrong, where, the value, what was expected and the remedy. The command line prints it as one
+line and exits with status 1.
 """
 
 
 class AnisomeshError(Exception):
-    """Base of every error that anisomesh raises on purpose."""
+    """Base class of all errors that anisomesh raises."""
 
 
 class MeshFileError(AnisomeshError):
@@ -14,16 +14,16 @@ class MeshFileError(AnisomeshError):
 
 
 class MeshError(AnisomeshError, ValueError):
-    """Arrays do not describe a mesh (index out of range, coordinates not finite, no face)."""
+    """Arrays or objects are not a mesh (index out of range, coordinates not finite, no face)."""
 
 
 class MetricError(AnisomeshError, ValueError):
-    """A metric field has the wrong shape or is not symmetric positive definite."""
+    """A metric field has the wrong shape, or its tensors are not symmetric positive definite."""
 
 
 class OptionError(AnisomeshError, ValueError):
-    """An option has a value outside its range."""
+    """The value of an option is out of range."""
 
 
 class TimeLimitError(AnisomeshError):
-    """The time limit was over before there was anything to return."""
+    """The time limit expired before there was a result."""

@@ -215,7 +215,7 @@ def test_the_larger_area_decides_the_orientation():
     prepared = prepare(Surface(clean.points, faces))
     assert volume(prepared.surface) == pytest.approx(volume(clean))
     assert prepared.report.faces_flipped == 100
-    assert prepared.report.lines() == ["100 face(s) turned over to agree with their neighbours"]
+    assert prepared.report.lines() == ["100 face(s) reversed to agree with their neighbours"]
 
 
 def test_components_are_oriented_one_by_one():

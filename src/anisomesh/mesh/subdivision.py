@@ -91,12 +91,7 @@ def split_long_edges(surface: Surface, max_length: float, *, max_faces: int) -> 
         parent = parent[origin]
     complete = not bool((current.edge_lengths > max_length).any())
     if not complete:
-        logger.info(
-            "subdivision stopped at %d of at most %d faces; some edges exceed %g",
-            current.n_faces,
-            max_faces,
-            max_length,
-        )
+        logger.info("subdivision reached the limit of %d faces; some edges are longer than %g", max_faces, max_length)
     point_corners = np.repeat(np.arange(current.n_points, dtype=np.int32)[:, None], 3, axis=1)
     barycentric = np.tile([1.0, 0.0, 0.0], (current.n_points, 1))
     added = current.faces >= surface.n_points

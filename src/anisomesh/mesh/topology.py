@@ -87,17 +87,14 @@ def corner_fans(faces: Faces, pairs: npt.NDArray[np.int64]) -> tuple[int, npt.ND
     corners = faces.ravel()
     start, end = side_ends(pairs)
     same_direction = corners[start[:, 0]] == corners[start[:, 1]]
-    rows = np.concatenate([start[:, 0], end[:, 0]])
-    columns = np.concatenate(
-        [np.where(same_direction, start[:, 1], end[:, 1]), np.where(same_direction, end[:, 1], start[:, 1])],
-    )
-    return graph_components(rows, columns, len(corners))
+    at_start = np.stack([start[:, 0], np.where(same_direction, start[:, 1], end[:, 1])], axis=1)
+    at_end = np.stack([end[:, 0], np.where(same_direction, end[:, 1], start[:, 1])], axis=1)
+    return graph_components(np.concatenate([at_start, at_end]), len(corners))
 
 
 def connected_components(faces: Faces, n_points: int) -> tuple[int, FaceLabels]:
     """Return the number of components and the component of every face (F,); faces with a common point connect."""
-    rows, columns = faces[:, [0, 0]].ravel(), faces[:, [1, 2]].ravel()
-    _, labels = graph_components(rows, columns, n_points)
+    _, labels = graph_components(faces[:, [0, 1, 0, 2]].reshape(-1, 2), n_points)
     used, face_labels = np.unique(labels[faces[:, 0]], return_inverse=True)
     return len(used), face_labels.astype(np.int32)
 
@@ -187,10 +184,9 @@ def _edge_trails(tails: npt.NDArray[np.int32], heads: npt.NDArray[np.int32]) -> 
     return trails
 
 
-def graph_components(
-    rows: npt.NDArray[np.integer], columns: npt.NDArray[np.integer], size: int
-) -> tuple[int, npt.NDArray[np.int32]]:
-    """Return the number of components of an undirected graph with edges rows-columns, and the label of each node."""
-    graph = sparse.coo_matrix((np.ones(len(rows), dtype=np.bool_), (rows, columns)), shape=(size, size))
+def graph_components(links: npt.NDArray[np.integer], size: int) -> tuple[int, npt.NDArray[np.int32]]:
+    """Return the number of connected components of a graph of links (n, 2), and the component (size,) of each node."""
+    weights = np.ones(len(links), dtype=np.bool_)
+    graph = sparse.coo_matrix((weights, (links[:, 0], links[:, 1])), shape=(size, size))
     count, labels = csgraph.connected_components(graph, directed=False)
     return int(count), labels.astype(np.int32)

@@ -22,7 +22,7 @@ def coincident(points: Points, tolerance: float = 0.0) -> PointLabels:
     """
     if tolerance > 0:
         pairs = cKDTree(points).query_pairs(tolerance, output_type="ndarray")
-        group = graph_components(pairs[:, 0], pairs[:, 1], len(points))[1]
+        group = graph_components(pairs, len(points))[1]
     else:
         order = np.lexsort(points.T)
         sorted_points = points[order]

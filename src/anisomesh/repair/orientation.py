@@ -1,4 +1,8 @@
-"""Orientation of triangle soups, and the sides to glue so that every point has one fan."""
+"""Oriented manifolds from triangle soups: which sides to glue, which faces to reverse, which points to split.
+
+Sides are numbered as in :mod:`anisomesh.mesh.topology`. The approach is cutting and stitching (Gueziec, Taubin,
+Lazarus, Horn, "Cutting and stitching: converting sets of polygons to manifold surfaces", IEEE TVCG 7, 2001).
+"""
 
 from __future__ import annotations
 
@@ -19,48 +23,54 @@ Sides = npt.NDArray[np.int64]
 
 @dataclass(frozen=True, kw_only=True)
 class Orientation:
-    """Which faces to turn over, and which glued pairs of sides to cut open since nothing can orient them."""
+    """The reversals that orient a surface consistently across its pairs of glued sides.
+
+    Attributes
+    ----------
+    flip
+        Which faces (F,) to reverse.
+    conflict
+        Which pairs (n,) to cut open, since a component is not orientable.
+    """
 
     flip: FaceMask
     conflict: npt.NDArray[np.bool_]
-    n_nonorientable: int
 
 
-def glue(faces: Faces, welded: Faces) -> tuple[Pairs, Sides]:
-    """Pair the sides of faces that belong together beyond doubt.
+def pair_sides(faces: Faces, welded: Faces) -> tuple[Pairs, Sides]:
+    """Pair the sides of faces that share an edge with no other face.
 
     Parameters
     ----------
     faces
         Point indices (F, 3), before coincident points were merged.
     welded
-        The same faces with coincident points merged.
+        The faces (F, 3) with coincident points merged.
 
     Returns
     -------
     tuple
-        Pairs (n, 2) of sides, and the sides that are left on edges with more than two of them.
+        Pairs (n, 2) of sides, and the remaining sides on edges with more than two sides.
 
     Notes
     -----
-    Two faces that share an edge of the input stay neighbours, whatever else touches that edge: a surface
-    that is manifold already is not spoiled by points that happen to coincide. Only sides without a partner
-    are matched by coincident points.
+    Two faces that share an edge of ``faces`` stay neighbours whatever else coincides with the edge, so that coincident
+    parts of a manifold surface stay separate. Only unpaired sides are matched by coincident points.
     """
-    every = np.arange(3 * len(faces))
-    pairs, _ = _twos(topology.edges_of(faces)[1].ravel(), every)
-    more, crowded = _twos(topology.edges_of(welded)[1].ravel(), np.setdiff1d(every, pairs))
-    return np.concatenate([pairs, more]), crowded
+    all_sides = np.arange(3 * len(faces))
+    pairs, _ = _pair_twos(topology.edges_of(faces)[1].ravel(), all_sides)
+    welded_pairs, nonmanifold = _pair_twos(topology.edges_of(welded)[1].ravel(), np.setdiff1d(all_sides, pairs))
+    return np.concatenate([pairs, welded_pairs]), nonmanifold
 
 
-def turn(sides: Sides, flip: FaceMask) -> Sides:
-    """Return the numbers that sides have after the last two corners of the faces in ``flip`` are swapped."""
+def renumber_sides(sides: Sides, flip: FaceMask) -> Sides:
+    """Return the numbers of sides after faces are reversed by swapping their last two corners."""
     face, corner = np.divmod(sides, 3)
-    turned: Sides = 3 * face + np.where(flip[face], (3 - corner) % 3, corner)
-    return turned
+    renumbered: Sides = 3 * face + np.where(flip[face], (3 - corner) % 3, corner)
+    return renumbered
 
 
-def orient(faces: Faces, pairs: Pairs, areas: FaceScalars) -> Orientation:
+def find_orientation(faces: Faces, pairs: Pairs, areas: FaceScalars) -> Orientation:
     """Find a consistent orientation across pairs of sides.
 
     Parameters
@@ -68,33 +78,32 @@ def orient(faces: Faces, pairs: Pairs, areas: FaceScalars) -> Orientation:
     faces
         Point indices (F, 3).
     pairs
-        Pairs (n, 2) of sides across which to be consistent.
+        Pairs (n, 2) of glued sides.
     areas
-        Face areas (F,): in each component the faces with less than half the area are turned.
+        Face areas (F,): each component is oriented as the larger part of its area is.
 
     Notes
     -----
-    Faces that agree already are one patch; a breadth-first tree over the patches decides which patches turn.
-    So a surface that is consistent but for a cut keeps that very cut, and the second run changes nothing.
-    Linear in the number of faces.
+    Faces that are consistent with their neighbours form patches; a breadth-first tree over the patches decides which
+    to reverse. A surface that is consistent except across cuts therefore keeps these cuts, and a second pass changes
+    nothing. Linear in the number of faces.
     """
     sides = topology.half_edges(faces)
     disagree = sides[pairs[:, 0], 0] == sides[pairs[:, 1], 0]
-    ends = pairs // 3
-    n_patches, patch = _components(ends[~disagree], len(faces))
-    links = patch[ends[disagree]]
-    turned = _tree_parity(links, n_patches)[patch]
+    pair_faces = pairs // 3
+    n_patches, patch = topology.graph_components(pair_faces[~disagree], len(faces))
+    links = patch[pair_faces[disagree]]
+    odd = _tree_parity(links, n_patches)[patch]
     conflict = np.zeros(len(pairs), dtype=np.bool_)
-    conflict[disagree] = turned[ends[disagree, 0]] == turned[ends[disagree, 1]]
-    n_components, component = _components(ends, len(faces))
-    turned_area = np.bincount(component, areas * turned, minlength=n_components)
-    flip = turned ^ (2 * turned_area > np.bincount(component, areas, minlength=n_components))[component]
-    n_nonorientable = len(np.unique(component[ends[conflict, 0]]))
-    return Orientation(flip=flip, conflict=conflict, n_nonorientable=n_nonorientable)
+    conflict[disagree] = odd[pair_faces[disagree, 0]] == odd[pair_faces[disagree, 1]]
+    n_components, component = topology.graph_components(pair_faces, len(faces))
+    odd_area = np.bincount(component, areas * odd, minlength=n_components)
+    flip = odd ^ (2 * odd_area > np.bincount(component, areas, minlength=n_components))[component]
+    return Orientation(flip=flip, conflict=conflict)
 
 
-def wedge_pairs(points: Points, faces: Faces, crowded: Sides) -> Pairs:
-    """Pair sides on edges with more than two of them, as neighbours around the edge.
+def pair_nonmanifold_sides(points: Points, faces: Faces, sides: Sides) -> Pairs:
+    """Pair the sides of oriented faces on non-manifold edges by their angle around the edge.
 
     Parameters
     ----------
@@ -102,76 +111,74 @@ def wedge_pairs(points: Points, faces: Faces, crowded: Sides) -> Pairs:
         Coordinates (V, 3).
     faces
         Oriented faces (F, 3).
-    crowded
-        The sides to pair.
+    sides
+        The sides (n,) to pair.
 
     Returns
     -------
     ndarray
-        Pairs (n, 2) of sides of opposite direction. With outside as the faces' orientation says, the two faces
-        of a pair bound the same wedge of material; sides that find no partner are not listed.
+        Pairs (m, 2) of sides in opposite directions, whose faces bound the same wedge of the solid. Sides without a
+        partner are not listed.
 
     Notes
     -----
-    Around the edge, in the direction of increasing angle, material begins behind a face that runs against the
-    edge and ends at one that runs along it: so the faces pair like brackets. The angle is counted from the
-    first face along its own direction, which makes the result independent of the numbering of the points.
+    By increasing angle around the edge, the solid begins behind a face whose side is against the edge and ends at one
+    whose side is along it, so that the faces pair like brackets. Angles are measured from the first face in the
+    direction of its side, which makes the result independent of the numbering of the points.
     """
-    edges_at = topology.edges_of(faces)[1].ravel()
-    crowded = np.sort(crowded)
-    crowded = crowded[np.argsort(edges_at[crowded], kind="stable")]
-    if len(crowded) == 0:
+    side_edges = topology.edges_of(faces)[1].ravel()
+    sides = np.sort(sides)
+    sides = sides[np.argsort(side_edges[sides], kind="stable")]
+    if len(sides) == 0:
         return np.zeros((0, 2), dtype=np.int64)
-    new_group = np.diff(edges_at[crowded], prepend=-1) != 0
-    group = np.cumsum(new_group) - 1
-    reference = crowded[new_group][group]
+    first_of_edge = np.diff(side_edges[sides], prepend=-1) != 0
+    group = np.cumsum(first_of_edge) - 1
     corners = faces.ravel()
-    start, end = (corners[ends] for ends in topology.side_ends(reference))
+    start, end = (corners[ends] for ends in topology.side_ends(sides[first_of_edge][group]))
     axis = geometry.unit(points[end] - points[start])
-    outward = points[corners[crowded]] - points[start]
+    outward = points[corners[sides]] - points[start]
     outward -= (outward * axis).sum(axis=1, keepdims=True) * axis
-    across = geometry.unit(outward)[new_group][group]
-    upward = np.cross(axis, across)
-    angle = np.arctan2((outward * upward).sum(axis=1), (outward * across).sum(axis=1)) % (2 * np.pi)
-    angle[new_group] = 0.0
-    closes = corners[topology.side_ends(crowded)[0]] == start
-    order = np.lexsort((crowded, angle, group))
-    bounds = np.append(np.flatnonzero(new_group), len(crowded)).tolist()
-    sides, closing = crowded[order].tolist(), closes[order].tolist()
+    x_axis = geometry.unit(outward)[first_of_edge][group]
+    y_axis = np.cross(axis, x_axis)
+    angle = np.arctan2((outward * y_axis).sum(axis=1), (outward * x_axis).sum(axis=1)) % (2 * np.pi)
+    angle[first_of_edge] = 0.0
+    closes = corners[topology.side_ends(sides)[0]] == start
+    order = np.lexsort((sides, angle, group))
+    bounds = np.append(np.flatnonzero(first_of_edge), len(sides)).tolist()
+    side_list, closing = sides[order].tolist(), closes[order].tolist()
     pairs: list[tuple[int, int]] = []
     for first, last in pairwise(bounds):
-        pairs += _brackets(sides[first:last], closing[first:last])
+        pairs += _match_brackets(side_list[first:last], closing[first:last])
     return np.array(pairs, dtype=np.int64).reshape(-1, 2)
 
 
-def settle(faces: Faces, pairs: Pairs) -> tuple[int, npt.NDArray[np.int32]]:
-    """Return the number of points and the point of every corner (3F,) once only ``pairs`` are glued.
+def split_points(faces: Faces, pairs: Pairs) -> tuple[int, npt.NDArray[np.int32]]:
+    """Give every fan of faces its own point; return the number of points and the point of every corner (3F,).
 
     Notes
     -----
-    Two sheets can still share both ends of an edge, where a surface passes twice through the same edge and
-    the same fans. Such edges are cut open. That is enough: a side that is not glued is an end of its fans, and
-    a fan has two ends, so that at most two such sides are left on an edge, and those run in opposite directions.
-    Cutting may split fans but never joins any, and each round removes pairs, so this ends.
+    Where a surface passes twice through an edge and through the same fans at both of its ends, the edge keeps more than
+    two faces; the pairs there are removed. An unglued side ends its fans and a fan has two ends, so that at most two
+    such sides, of opposite direction, remain on an edge. Every round removes pairs, so that the loop terminates.
     """
     while True:
-        count, corner_point = topology.corner_fans(faces, pairs)
-        face_edges = topology.edges_of(corner_point.reshape(-1, 3))[1].ravel()
-        crowded = (np.bincount(face_edges) > 2)[face_edges]
-        if not crowded.any():
-            return count, corner_point
-        pairs = pairs[~crowded[pairs].any(axis=1)]
+        n_points, corner_point = topology.corner_fans(faces, pairs)
+        side_edges = topology.edges_of(corner_point.reshape(-1, 3))[1].ravel()
+        nonmanifold = (np.bincount(side_edges) > 2)[side_edges]
+        if not nonmanifold.any():
+            return n_points, corner_point
+        pairs = pairs[~nonmanifold[pairs].any(axis=1)]
 
 
-def _twos(edges_at: npt.NDArray[np.int32], sides: Sides) -> tuple[Pairs, Sides]:
-    """Pair those of the sides that are two on their edge; return also those that are more."""
-    order = sides[np.argsort(edges_at[sides], kind="stable")]
-    count = np.bincount(edges_at[sides], minlength=1)[edges_at[order]]
+def _pair_twos(side_edges: npt.NDArray[np.int32], sides: Sides) -> tuple[Pairs, Sides]:
+    """Pair sides on edges with exactly two of the sides; return also the sides on edges with more."""
+    order = sides[np.argsort(side_edges[sides], kind="stable")]
+    count = np.bincount(side_edges[sides], minlength=1)[side_edges[order]]
     return order[count == 2].reshape(-1, 2), order[count > 2]
 
 
-def _brackets(sides: list[int], closing: list[bool]) -> list[tuple[int, int]]:
-    """Match opening with closing sides around a circle."""
+def _match_brackets(sides: list[int], closing: list[bool]) -> list[tuple[int, int]]:
+    """Pair opening with closing sides, in cyclic order."""
     pairs: list[tuple[int, int]] = []
     stack: list[int] = []
     used: set[int] = set()
@@ -188,8 +195,8 @@ def _brackets(sides: list[int], closing: list[bool]) -> list[tuple[int, int]]:
 
 
 def _tree_parity(links: npt.NDArray[np.int32], size: int) -> npt.NDArray[np.bool_]:
-    """Return for each node whether its depth in a breadth-first forest over the links (n, 2) is odd."""
-    n_trees, tree = _components(links, size)
+    """Return for each node (size,) whether its depth in a breadth-first forest over the links (n, 2) is odd."""
+    n_trees, tree = topology.graph_components(links, size)
     roots = np.full(n_trees, size, dtype=np.int64)
     np.minimum.at(roots, tree, np.arange(size))
     rows = np.concatenate([links[:, 0], roots])
@@ -203,10 +210,3 @@ def _tree_parity(links: npt.NDArray[np.int32], size: int) -> npt.NDArray[np.bool
         odd = odd ^ odd[parent]
         parent = parent[parent]
     return odd[:size]
-
-
-def _components(links: npt.NDArray[np.integer], size: int) -> tuple[int, npt.NDArray[np.int32]]:
-    weights = np.ones(len(links), dtype=np.bool_)
-    graph = sparse.coo_matrix((weights, (links[:, 0], links[:, 1])), shape=(size, size))
-    count, labels = csgraph.connected_components(graph, directed=False)
-    return int(count), labels.astype(np.int32)

@@ -1,4 +1,4 @@
-"""Turning any triangle soup into oriented manifold orientation."""
+"""Repair of any triangle soup to an oriented manifold surface."""
 
 from __future__ import annotations
 
@@ -16,46 +16,44 @@ from anisomesh.repair import degenerate, duplicates, orientation
 
 logger = logging.getLogger(__name__)
 
-LARGEST = 1e152  # of a coordinate, whose square is a number
-MAX_STEPS = 20
+_MAX_COORDINATE = 1e152  # and inverse of the least extent, so that squares neither overflow nor underflow in float64
+_MAX_REPAIR_PASSES = 20  # two or three are enough in practice; heuristic
+_MAX_WELD_TOLERANCE = 0.1  # of the bounding-box diagonal; heuristic
 
-WELD_LIMIT = 0.1
-"""Largest weld tolerance, as a fraction of the diagonal of the bounding box."""
-
-SENTENCES = {
-    "points_welded": "{} point(s) merged with a coincident one",
+_CHANGE_DESCRIPTIONS = {
+    "points_welded": "{} point(s) merged with a coincident point",
     "faces_degenerate": "{} face(s) without area removed or merged into a neighbour",
-    "faces_duplicate": "{} face(s) removed that repeat another one",
-    "points_unreferenced": "{} point(s) removed that no face uses",
-    "faces_flipped": "{} face(s) turned over to agree with their neighbours",
-    "edges_nonmanifold_cut": "{} edge(s) with more than two faces separated into sheets",
-    "edges_nonorientable_cut": "{} edge(s) cut open since no orientation agrees across them",
-    "points_nonmanifold_split": "{} point(s) copied to separate the sheets that met there",
+    "faces_duplicate": "{} duplicate face(s) removed",
+    "points_unreferenced": "{} unused point(s) removed",
+    "faces_flipped": "{} face(s) reversed to agree with their neighbours",
+    "edges_nonmanifold_cut": "{} edge(s) with more than two faces cut apart",
+    "edges_nonorientable_cut": "{} edge(s) cut open because the surface is not orientable",
+    "points_nonmanifold_split": "{} point(s) added to split non-manifold points",
 }
 
 
 @dataclass(frozen=True, kw_only=True)
 class PrepareReport:
-    """What :func:`prepare` did; all counts but the number of components are zero for a clean surface.
+    """Counts of the changes made by :func:`prepare`; all except ``components`` are zero for a clean surface.
 
-    Parameters
+    Attributes
     ----------
     points_welded
-        Points that were merged into another one.
+        Points merged into another point.
     faces_degenerate
-        Faces without area that were removed, or exchanged for a split of their neighbour.
+        Faces without area, removed or flipped into a neighbour.
     faces_duplicate
-        Faces with the same three points as another face.
+        Removed faces with the same three points as another face.
     points_unreferenced
-        Points that no face used.
+        Removed points that no face used.
     faces_flipped
-        Faces whose orientation was turned.
+        Faces whose orientation was reversed.
     edges_nonmanifold_cut
-        Edges that had more than two faces.
+        Edges with more than two faces, cut apart.
     edges_nonorientable_cut
-        Edges cut open because the component is not orientable (a Moebius strip).
+        Edges cut open because their component is not orientable, as a Moebius strip.
     points_nonmanifold_split
-        Copies of points added to separate orientation.
+        Copies of points added so that the faces at each point form one fan.
     components
         Connected components of the result.
     """
@@ -72,27 +70,28 @@ class PrepareReport:
 
     @property
     def changed(self) -> bool:
-        """Whether anything was done."""
+        """Whether anything was changed."""
         return any(getattr(self, field.name) for field in fields(self) if field.name != "components")
 
     def lines(self) -> list[str]:
-        """Return one sentence for each kind of change."""
-        return [text.format(f"{getattr(self, name):,}") for name, text in SENTENCES.items() if getattr(self, name)]
+        """Return a line of text for each kind of change that was made."""
+        counts = {name: getattr(self, name) for name in _CHANGE_DESCRIPTIONS}
+        return [_CHANGE_DESCRIPTIONS[name].format(f"{count:,}") for name, count in counts.items() if count]
 
 
 @dataclass(frozen=True, kw_only=True)
 class Prepared:
-    """An oriented manifold surface and where it comes from.
+    """An oriented manifold surface and its relation to the input.
 
-    Parameters
+    Attributes
     ----------
     surface
-        Every edge has at most two faces, which agree in orientation; the faces at each point form one fan.
+        Every edge has at most two faces, consistently oriented, and the faces at each point form one fan.
     report
-        What was done.
+        The changes.
     point_source
-        An input point for every point (V,), at the same place up to the weld tolerance and the rounding error below
-        which a side of a face has no length.
+        For every point (V,) an input point at the same position, up to the weld tolerance and the length below which
+        sides of faces are collapsed (about 1e-14 of the longest side).
     """
 
     surface: Surface
@@ -101,55 +100,54 @@ class Prepared:
 
 
 def prepare(surface: Surface, *, weld_tolerance: float = 0.0) -> Prepared:
-    """Make any triangle mesh an oriented manifold, with as little change as it takes.
+    """Make any triangle mesh an oriented manifold, with as few changes as possible.
 
     Parameters
     ----------
     surface
         Any triangle mesh.
     weld_tolerance
-        Points up to this distance (model units) become one. Equal points always do.
+        Points up to this distance, in model units, are merged; 0 merges equal points only.
 
     Returns
     -------
     Prepared
-        A surface that needs nothing comes back as the same object, even where parts of it coincide.
+        A surface that needs no repair is returned as the same object, even if parts of it coincide.
 
     Raises
     ------
     MeshError
-        If no face with an area is left, or the coordinates are too large or too small to compute with.
+        If no face with an area remains, or coordinates or the extent are beyond the range of float64 areas.
     OptionError
-        If the tolerance is negative, not finite, or above a tenth of the diagonal of the bounding box.
+        If the tolerance is negative, not finite, or above a tenth of the bounding-box diagonal.
 
     Notes
     -----
-    In order: weld; remove degenerate and duplicate faces (of duplicates the first is kept, but for flaps); orient each
-    component as the larger part of its area is, cutting what cannot be oriented; glue the faces again at edges
-    with two faces, and at others those that bound the same wedge of material, so that two cubes sharing an edge
-    become two closed cubes; give every fan of faces its own point. This is repeated until nothing changes (two or
-    three times in practice), so that preparing twice does nothing more. Sorting
-    dominates the cost: O((V + F) log(V + F)).
+    The steps of a pass are: weld points; remove degenerate and duplicate faces; orient each component by the larger
+    part of its area, cutting edges where that is impossible; glue faces at edges with two faces, and at other edges
+    the pairs that bound the same wedge of the solid, so that two cubes sharing an edge become two closed cubes; give
+    each fan of faces its own point. Passes are repeated until nothing changes, so that a second call of this function
+    changes nothing. Sorting dominates the cost, O((V + F) log(V + F)).
     """
     _check_range(surface)
     _check_tolerance(surface, weld_tolerance)
-    steps = [_step(surface, weld_tolerance)]
-    while steps[-1].changed and len(steps) < MAX_STEPS:
-        steps.append(_step(steps[-1].surface, weld_tolerance))
-    result = steps[-1].surface
-    source = steps[0].source
-    for step in steps[1:]:
-        source = source[step.source]
-    used, kept = len(np.unique(surface.faces)), len(np.unique(source))
+    passes = [_repair_once(surface, weld_tolerance)]
+    while passes[-1].changed and len(passes) < _MAX_REPAIR_PASSES:
+        passes.append(_repair_once(passes[-1].surface, weld_tolerance))
+    result = passes[-1].surface
+    source = passes[0].source
+    for later in passes[1:]:
+        source = source[later.source]
+    n_used, n_sources = len(np.unique(surface.faces)), len(np.unique(source))
     report = PrepareReport(
-        points_welded=max(used - kept, 0),
-        faces_degenerate=sum(step.n_degenerate for step in steps),
-        faces_duplicate=sum(step.n_duplicate for step in steps),
-        points_unreferenced=surface.n_points - used,
-        faces_flipped=sum(step.n_flipped for step in steps),
-        edges_nonmanifold_cut=steps[0].n_crowded if steps[0].changed else 0,
-        edges_nonorientable_cut=steps[-1].n_conflicts if steps[0].changed else 0,
-        points_nonmanifold_split=result.n_points - kept,
+        points_welded=max(n_used - n_sources, 0),
+        faces_degenerate=sum(each.n_degenerate for each in passes),
+        faces_duplicate=sum(each.n_duplicate for each in passes),
+        points_unreferenced=surface.n_points - n_used,
+        faces_flipped=sum(each.n_flipped for each in passes),
+        edges_nonmanifold_cut=passes[0].n_nonmanifold_edges if passes[0].changed else 0,
+        edges_nonorientable_cut=passes[-1].n_conflicts if passes[0].changed else 0,
+        points_nonmanifold_split=result.n_points - n_sources,
         components=topology.connected_components(result.faces, result.n_points)[0],
     )
     for line in report.lines():
@@ -158,70 +156,74 @@ def prepare(surface: Surface, *, weld_tolerance: float = 0.0) -> Prepared:
 
 
 @dataclass(frozen=True, kw_only=True)
-class _Step:
+class _RepairPass:
+    """The result of one pass, and the input point of each of its points."""
+
     surface: Surface
     source: PointLabels
     changed: bool
     n_degenerate: int = 0
     n_duplicate: int = 0
     n_flipped: int = 0
-    n_crowded: int = 0
+    n_nonmanifold_edges: int = 0
     n_conflicts: int = 0
 
 
-def _step(surface: Surface, tolerance: float) -> _Step:
-    """Do everything once: sides that find no partner now may find one the next time."""
+def _repair_once(surface: Surface, tolerance: float) -> _RepairPass:
+    """Run all steps once; sides without a partner may find one in the next pass."""
     labels = _weld(surface, tolerance)
     if _is_clean(surface, labels):
-        return _Step(surface=surface, source=np.arange(surface.n_points, dtype=np.int32), changed=False)
+        return _RepairPass(surface=surface, source=np.arange(surface.n_points, dtype=np.int32), changed=False)
     n_degenerate = int(degenerate.is_degenerate(surface.points, labels[surface.faces]).sum())
     faces, labels = degenerate.remove_degenerate(surface.points, surface.faces, labels)
     n_nondegenerate = len(faces)
-    faces = faces[duplicates.kept(labels[faces])]
+    faces = faces[duplicates.select_unique_faces(labels[faces])]
     if len(faces) == 0:
-        raise MeshError(f"none of the {surface.n_faces} faces has an area; nothing is left to work on")
-    pairs, crowded = orientation.glue(faces, labels[faces])
+        raise MeshError(f"none of the {surface.n_faces:,} faces has an area; nothing is left after the repair")
+    pairs, nonmanifold = orientation.pair_sides(faces, labels[faces])
     areas = 0.5 * np.linalg.norm(geometry.face_cross(surface.points, labels[faces]), axis=1)
-    found = orientation.orient(labels[faces], pairs, areas)
+    found = orientation.find_orientation(labels[faces], pairs, areas)
     faces[found.flip] = faces[found.flip][:, [0, 2, 1]]
-    pairs, crowded = (orientation.turn(sides, found.flip) for sides in (pairs[~found.conflict], crowded))
+    pairs = orientation.renumber_sides(pairs[~found.conflict], found.flip)
+    nonmanifold = orientation.renumber_sides(nonmanifold, found.flip)
     welded = labels[faces]
-    pairs = np.concatenate([pairs, orientation.wedge_pairs(surface.points, welded, crowded)])
-    source, new_faces = _numbered(faces, *orientation.settle(welded, pairs))
+    pairs = np.concatenate([pairs, orientation.pair_nonmanifold_sides(surface.points, welded, nonmanifold)])
+    source, new_faces = _order_points(faces, *orientation.split_points(welded, pairs))
     points = surface.points[labels[source]]
     changed = not (np.array_equal(new_faces, surface.faces) and np.array_equal(points, surface.points))
-    return _Step(
+    return _RepairPass(
         surface=Surface(points, new_faces) if changed else surface,
         source=source,
         changed=changed,
         n_degenerate=n_degenerate,
         n_duplicate=n_nondegenerate - len(faces),
         n_flipped=int(found.flip.sum()),
-        n_crowded=len(np.unique(topology.edges_of(welded)[1].ravel()[crowded])),
+        n_nonmanifold_edges=len(np.unique(topology.edges_of(welded)[1].ravel()[nonmanifold])),
         n_conflicts=int(found.conflict.sum()),
     )
 
 
 def _check_range(surface: Surface) -> None:
     size, extent = float(np.abs(surface.points).max()), float(np.ptp(surface.points, axis=0).max())
-    if size > LARGEST or 0.0 < extent < 1.0 / LARGEST:
+    least = 1.0 / _MAX_COORDINATE
+    if size > _MAX_COORDINATE or 0.0 < extent < least:
         raise MeshError(
-            f"the mesh is {extent:.3g} wide with coordinates up to {size:.3g}; scale it to between {1.0 / LARGEST:.0e} "
-            f"and {LARGEST:.0e}, beyond which areas overflow or vanish"
+            f"the mesh has extent {extent:.3g} and coordinates up to {size:.3g}; expected {least:.0e} to "
+            f"{_MAX_COORDINATE:.0e}, beyond which areas overflow or vanish; scale it"
         )
 
 
 def _check_tolerance(surface: Surface, tolerance: float) -> None:
-    limit = WELD_LIMIT * surface.diagonal
+    limit = _MAX_WELD_TOLERANCE * surface.diagonal
     if not (np.isfinite(tolerance) and tolerance >= 0) or (tolerance > limit and tolerance > 0):
         raise OptionError(
             f"weld_tolerance is {tolerance:g}; expected a length in model units from 0 to {limit:g}, a tenth of the "
-            "diagonal of the bounding box"
+            "bounding-box diagonal"
         )
 
 
 def _weld(surface: Surface, tolerance: float) -> PointLabels:
-    """Return the lowest coincident point of every point; unused points take no part."""
+    """Return the lowest coincident point of every point (V,); unused points are ignored."""
     used = np.unique(surface.faces)
     labels = np.arange(surface.n_points, dtype=np.int32)
     labels[used] = used[coincident(surface.points[used], tolerance)]
@@ -229,7 +231,7 @@ def _weld(surface: Surface, tolerance: float) -> PointLabels:
 
 
 def _is_clean(surface: Surface, labels: PointLabels) -> bool:
-    """Return whether nothing needs to be done; coincident points are welcome unless they could close a gap."""
+    """Return whether no repair is needed; coincident points are accepted unless welding them would close a gap."""
     faces, used = surface.faces, np.unique(surface.faces)
     if len(used) < surface.n_points or surface.edge_face_count.max() > 2 or not topology.is_oriented(faces):
         return False
@@ -239,12 +241,12 @@ def _is_clean(surface: Surface, labels: PointLabels) -> bool:
         len(np.unique(gaps)) == len(gaps)
         and topology.count_nonmanifold_points(faces) == 0
         and not degenerate.is_degenerate(surface.points, labels[faces]).any()
-        and duplicates.kept(faces).all()
+        and duplicates.select_unique_faces(faces).all()
     )
 
 
-def _numbered(faces: Faces, n_points: int, corner_point: Indices) -> tuple[PointLabels, Faces]:
-    """Give points the order of the lowest input point at their corners; return that point and the faces."""
+def _order_points(faces: Faces, n_points: int, corner_point: Indices) -> tuple[PointLabels, Faces]:
+    """Sort points by the lowest input point at their corners; return this point (V,) and the faces (F, 3)."""
     source = np.full(n_points, np.iinfo(np.int32).max, dtype=np.int32)
     np.minimum.at(source, corner_point, faces.ravel())
     order = np.argsort(source, kind="stable")
