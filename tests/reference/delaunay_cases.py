@@ -1,42 +1,41 @@
-"""Duals of given sites, and what a closed manifold is, for several test files."""
+"""Duals and meshes of given sites, and what a closed manifold is, for several test files."""
 
 import numpy as np
 
-from anisomesh.cvt.features import Features
-from anisomesh.cvt.optimise import lloyd
+from anisomesh.cvt.lloyd import lloyd
 from anisomesh.delaunay.dual import dual_mesh
-from anisomesh.delaunay.refine import refine
+from anisomesh.delaunay.meshing import MeshingTask, mesh_from_sites
 from anisomesh.features.detect import sharp_edges
+from anisomesh.features.network import trace_features
 from anisomesh.mesh import topology
-from anisomesh.mesh.surface import Surface
 from anisomesh.metric.tensors import uniform_metric
-from anisomesh.voronoi.cells import cells_of
+from anisomesh.voronoi.cells import cell_complex
+from anisomesh.voronoi.embedded_surface import EmbeddedSurface
 from anisomesh.voronoi.restricted import RestrictedVoronoi
 
 
 def dual_case(surface, sites, points=None, iterations=0):
-    """Return diagram, cells and dual of sites on a surface, embedded in its own space unless ``points`` are given."""
-    voronoi = RestrictedVoronoi(surface.points if points is None else points, surface.faces)
-    sites = lloyd(voronoi, sites, iterations)
-    diagram = voronoi.diagram(sites)
-    ordered = Surface(surface.points, voronoi.faces)
-    cells = cells_of(diagram, ordered.face_neighbours, voronoi.facets.area)
-    return diagram, cells, dual_mesh(diagram, cells, ordered)
+    """Return cells and dual of sites on a surface, embedded by its own coordinates unless ``points`` are given."""
+    voronoi = RestrictedVoronoi(EmbeddedSurface(surface, surface.points if points is None else points))
+    cells = cell_complex(voronoi.diagram(lloyd(voronoi, sites, iterations)))
+    return cells, dual_mesh(cells)
 
 
-def mended(voronoi, sites, surface, scale=1.0, crease_angle=180.0, always=False):
-    """Return what refinement makes of these sites, as many vertices asked for as there are sites."""
-    sharp = sharp_edges(surface, crease_angle)
-    return refine(
-        voronoi,
-        sites,
-        surface,
-        surface,
-        Features(voronoi, surface, len(sites), sharp, sharp & always),
-        scale,
-        n_vertices=len(sites),
-        tensors=uniform_metric(surface),
+def mesh_of(voronoi, sites, crease_angle=180.0, required=False):
+    """Return the valid mesh of these sites, with as many vertices asked for as there are sites."""
+    embedded, n = voronoi.embedded, len(sites)
+    sharp = sharp_edges(embedded.surface, crease_angle)
+    features = trace_features(
+        embedded.points, embedded.surface, n, embedded.site_spacing(n), sharp=sharp, required=sharp & required
     )
+    task = MeshingTask(
+        voronoi=voronoi,
+        features=features,
+        fallback=embedded.surface,
+        tensors=uniform_metric(embedded.surface),
+        n_vertices=n,
+    )
+    return mesh_from_sites(task, sites)
 
 
 def assert_closed_manifold(faces, euler):

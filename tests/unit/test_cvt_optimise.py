@@ -6,25 +6,33 @@ import naive_rvd as naive
 import numpy as np
 import pytest
 
-from anisomesh.cvt import optimise
-from anisomesh.cvt.optimise import Status, lloyd, minimise
+from anisomesh.cvt import lbfgs
+from anisomesh.cvt.energy import NormalMetric
+from anisomesh.cvt.lbfgs import DescentOptions, Status
+from anisomesh.cvt.lloyd import lloyd
 from anisomesh.cvt.sampling import sample_surface
 from anisomesh.shapes import analytic as shapes
-from anisomesh.voronoi.restricted import Evaluation, RestrictedVoronoi
+from anisomesh.voronoi.embedded_surface import EmbeddedSurface
+from anisomesh.voronoi.restricted import EnergyValue, RestrictedVoronoi
 
 
 def start(n=40, seed=0, surface=None):
     surface = surface or shapes.sphere(2)
-    voronoi = RestrictedVoronoi(surface.points, surface.faces)
+    voronoi = RestrictedVoronoi(EmbeddedSurface.in_space(surface))
     return voronoi, naive.random_sites(surface.points, surface.faces, n, np.random.default_rng(seed))
 
 
 def fake(gradient, mass):
-    return Evaluation(energy=1.0, gradient=gradient, mass=mass, cell_energy=np.ones(len(mass)))
+    return EnergyValue(value=1.0, gradient=gradient, mass=mass, per_cell=np.ones(len(mass)))
+
+
+def minimise(voronoi, sites, sharpness, on_iteration=None, **bounds):
+    options = DescentOptions(**bounds)
+    return lbfgs.minimise(voronoi, sites, NormalMetric(sharpness), options=options, on_iteration=on_iteration)
 
 
 @pytest.mark.parametrize("n_pairs", [0, 1, 2, 5])
-def test_direction_is_that_of_the_dense_recursion(n_pairs):
+def test_direction_matches_the_dense_recursion(n_pairs):
     rng = np.random.default_rng(n_pairs)
     n, d = 4, 3
     mass = rng.uniform(0.5, 2.0, n)
@@ -43,20 +51,18 @@ def test_direction_is_that_of_the_dense_recursion(n_pairs):
         inverse = left @ inverse @ left.T + rho * np.outer(step, step)
         pairs.append((step.reshape(n, d), change.reshape(n, d), rho))
     gradient = rng.normal(size=(n, d))
-    direction = optimise._direction(fake(gradient, mass), pairs)
+    direction = lbfgs._direction(fake(gradient, mass), pairs)
     np.testing.assert_allclose(direction.ravel(), -inverse @ gradient.ravel(), rtol=1e-10, atol=1e-12)
     if n_pairs:
-        # the secant equation: the last change of gradient is taken back to the last step
-        last = optimise._direction(fake(pairs[-1][1], mass), pairs)
+        # secant equation: the last change of the gradient is mapped to the last step
+        last = lbfgs._direction(fake(pairs[-1][1], mass), pairs)
         np.testing.assert_allclose(last, -pairs[-1][0], rtol=1e-9, atol=1e-10)
 
 
-def test_direction_without_pairs_is_the_step_of_lloyd():
+def test_direction_without_pairs_is_lloyds_step():
     voronoi, sites = start()
-    evaluation = voronoi.evaluate(sites, 1.0)
-    np.testing.assert_allclose(
-        sites + optimise._direction(evaluation, deque()), lloyd(voronoi, sites, 1), rtol=0, atol=1e-14
-    )
+    value = voronoi.integrate(sites, 1.0)
+    np.testing.assert_allclose(sites + lbfgs._direction(value, deque()), lloyd(voronoi, sites, 1), rtol=0, atol=1e-14)
 
 
 def test_sites_with_empty_cells_stay():
@@ -70,12 +76,12 @@ def test_sites_with_empty_cells_stay():
 @pytest.mark.parametrize("seed", range(3))
 def test_lloyd_never_raises_the_plain_energy_and_moves_sites_to_centroids(seed):
     voronoi, sites = start(seed=seed)
-    _, mass, moment = naive.energy(voronoi.points, voronoi.faces, sites, 1.0)
+    _, mass, moment = naive.energy(voronoi.embedded.points, voronoi.embedded.faces, sites, 1.0)
     np.testing.assert_allclose(lloyd(voronoi, sites, 1), moment / mass[:, None], atol=1e-11)
     energies = []
     last = lloyd(voronoi, sites, 30, lambda iteration, energy: energies.append((iteration, energy)))
     assert [iteration for iteration, _ in energies] == list(range(1, 31))
-    values = [energy for _, energy in energies] + [voronoi.evaluate(last).energy]
+    values = [energy for _, energy in energies] + [voronoi.integrate(last).value]
     assert np.all(np.diff(values) <= 1e-12 * values[0])
     assert values[-1] < 0.9 * values[0]
 
@@ -90,17 +96,17 @@ def test_minimise_converges_to_a_point_without_gradient(sharpness, tolerance):
         sharpness=sharpness,
         max_iterations=2000,
         tolerance=tolerance,
-        on_step=lambda iteration, energy: energies.append((iteration, energy)),
+        on_iteration=lambda iteration, energy: energies.append((iteration, energy)),
     )
     assert result.status is Status.CONVERGED
     assert result.iterations == len(energies) == energies[-1][0]
     assert result.evaluations > result.iterations
-    assert np.all(np.diff([voronoi.evaluate(sites, sharpness).energy, *(energy for _, energy in energies)]) < 0)
-    here = voronoi.evaluate(result.sites, sharpness)
-    assert here.energy == pytest.approx(result.energy, rel=1e-12)
+    assert np.all(np.diff([voronoi.integrate(sites, sharpness).value, *(energy for _, energy in energies)]) < 0)
+    here = voronoi.integrate(result.sites, sharpness)
+    assert here.value == pytest.approx(result.energy, rel=1e-12)
     step = here.gradient / (2 * here.mass[:, None])
     mean_square = (here.mass * (step**2).sum(axis=1)).sum() / here.mass.sum()
-    assert np.sqrt(mean_square) < tolerance * np.sqrt(here.energy / here.mass.sum()) * (1 + 1e-6)
+    assert np.sqrt(mean_square) < tolerance * np.sqrt(here.value / here.mass.sum()) * (1 + 1e-6)
 
 
 def test_a_smaller_tolerance_takes_more_iterations_and_the_limit_is_reported():
@@ -130,11 +136,11 @@ def test_where_no_step_descends_there_is_a_kink():
     voronoi, sites = start()
     result = minimise(voronoi, sites, sharpness=7.0, max_iterations=3000, tolerance=1e-6)
     assert result.status is Status.NO_DESCENT
-    here = voronoi.evaluate(result.sites, 7.0)
+    here = voronoi.integrate(result.sites, 7.0)
     direction = -here.gradient / np.linalg.norm(here.gradient)
     for step in 10.0 ** np.arange(-6, 0):
-        there = voronoi.evaluate(result.sites + step * direction, 7.0)
-        assert there.energy > here.energy
+        there = voronoi.integrate(result.sites + step * direction, 7.0)
+        assert there.value > here.value
         assert (there.gradient * direction).sum() > 0 > (here.gradient * direction).sum()
 
 
@@ -142,7 +148,7 @@ def test_minimise_is_deterministic_for_any_number_of_threads():
     surface = shapes.torus()
     results = []
     for threads in (1, 2, 2):
-        voronoi = RestrictedVoronoi(surface.points, surface.faces, threads=threads)
+        voronoi = RestrictedVoronoi(EmbeddedSurface.in_space(surface), threads=threads)
         sites = naive.random_sites(surface.points, surface.faces, 200, np.random.default_rng(0))
         results.append(minimise(voronoi, sites, sharpness=7.0, max_iterations=15))
     for result in results[1:]:
@@ -153,22 +159,23 @@ def test_minimise_is_deterministic_for_any_number_of_threads():
 def test_lbfgs_beats_lloyd_for_as_many_evaluations():
     voronoi, sites = start(60)
     result = minimise(voronoi, sites, sharpness=1.0, max_iterations=40)
-    assert result.energy < voronoi.evaluate(lloyd(voronoi, sites, result.evaluations)).energy * (1 + 1e-3)
+    assert result.energy < voronoi.integrate(lloyd(voronoi, sites, result.evaluations)).value * (1 + 1e-3)
 
 
-def test_cells_on_a_sphere_come_out_about_equal():
+def test_cells_on_a_sphere_have_about_equal_areas():
     surface = shapes.sphere(4)
-    voronoi = RestrictedVoronoi(surface.points, surface.faces)
-    sites = sample_surface(surface.points, voronoi.faces, voronoi.facets.area, 120, np.random.default_rng(0))
+    voronoi = RestrictedVoronoi(EmbeddedSurface.in_space(surface))
+    embedded = voronoi.embedded
+    sites = sample_surface(embedded.points, embedded.faces, embedded.face_areas, 120, np.random.default_rng(0))
     result = minimise(voronoi, sites, sharpness=1.0, max_iterations=200)
-    mass = voronoi.evaluate(result.sites).mass
+    mass = voronoi.integrate(result.sites).mass
     assert mass.std() < 0.06 * mass.mean()
-    assert voronoi.evaluate(sites).mass.std() > 0.3 * mass.mean()
+    assert voronoi.integrate(sites).mass.std() > 0.3 * mass.mean()
 
 
-def test_a_sharp_metric_draws_sites_onto_the_creases_of_a_box():
+def test_a_sharp_metric_attracts_sites_to_the_creases_of_a_box():
     surface = shapes.box(n=6)
-    voronoi = RestrictedVoronoi(surface.points, surface.faces)
+    voronoi = RestrictedVoronoi(EmbeddedSurface.in_space(surface))
     sites = naive.random_sites(surface.points, surface.faces, 150, np.random.default_rng(0))
     sites = lloyd(voronoi, sites, 10)
 

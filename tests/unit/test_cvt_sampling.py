@@ -4,8 +4,10 @@ import naive_rvd as naive
 import numpy as np
 import pytest
 
+from anisomesh.cvt.energy import NormalMetric
 from anisomesh.cvt.sampling import resample_by_energy, sample_surface
 from anisomesh.shapes import analytic as shapes
+from anisomesh.voronoi.embedded_surface import EmbeddedSurface
 from anisomesh.voronoi.restricted import RestrictedVoronoi
 
 
@@ -15,7 +17,7 @@ def test_counts_per_run_of_faces_differ_from_the_expectation_by_less_than_two():
     weights = rng.exponential(size=surface.n_faces)
     weights[::5] = 0.0
     n = 400
-    # put every face somewhere of its own, so that a point tells its face
+    # move the faces apart, so that the face of a point is known
     corners = surface.points[surface.faces] + 10.0 * np.arange(surface.n_faces)[:, None, None]
     points, faces = corners.reshape(-1, 3), np.arange(3 * surface.n_faces).reshape(-1, 3)
     sample = sample_surface(points, faces, weights, n, rng)
@@ -26,7 +28,7 @@ def test_counts_per_run_of_faces_differ_from_the_expectation_by_less_than_two():
     assert np.abs(count - expected).max() <= 1.0
 
 
-def test_points_lie_in_their_triangle_and_have_its_centroid_on_average():
+def test_points_lie_in_their_triangle_and_average_to_its_centroid():
     rng = np.random.default_rng(1)
     points = rng.normal(size=(3, 8))
     sample = sample_surface(points, np.array([[0, 1, 2]]), np.ones(1), 20_000, rng)
@@ -63,7 +65,7 @@ def test_scale_of_the_weights_does_not_matter(n):
 
 def test_resampling_by_energy_gathers_sites_at_creases_for_a_sharp_metric_only():
     surface = shapes.box(n=10)
-    voronoi = RestrictedVoronoi(surface.points, surface.faces)
+    voronoi = RestrictedVoronoi(EmbeddedSurface.in_space(surface))
     rng = np.random.default_rng(0)
     sites = naive.random_sites(surface.points, surface.faces, 400, rng)
     sites[11] = sites[12]  # an empty cell
@@ -71,6 +73,6 @@ def test_resampling_by_energy_gathers_sites_at_creases_for_a_sharp_metric_only()
     def near_crease(x):
         return np.mean(np.sort(np.abs(x - np.round(x)), axis=1)[:, 1] < 0.05)
 
-    plain, sharp = (near_crease(resample_by_energy(voronoi, sites, s, rng)) for s in (1.0, 15.0))
+    plain, sharp = (near_crease(resample_by_energy(voronoi, sites, NormalMetric(s), rng)) for s in (1.0, 15.0))
     assert sharp > 1.5 * plain
-    assert resample_by_energy(voronoi, sites, 15.0, rng).shape == sites.shape
+    assert resample_by_energy(voronoi, sites, NormalMetric(15.0), rng).shape == sites.shape

@@ -1,4 +1,4 @@
-"""The diagram as a polygon mesh: files can be read back and cover the surface."""
+"""Cells as polygons: files can be read back and cover the surface."""
 
 import meshio
 import naive_rvd as naive
@@ -9,17 +9,17 @@ from delaunay_cases import dual_case
 from anisomesh.errors import MeshFileError
 from anisomesh.io.rvd import N_COLOURS, save_polygons
 from anisomesh.shapes import analytic as shapes
-from anisomesh.voronoi.polygons import polygon_mesh
+from anisomesh.voronoi.polygons import cell_polygons
 
 
 @pytest.fixture(scope="module")
 def exported():
-    """A diagram in 6-D of a box in space and its polygons."""
+    """The cells of a diagram of a box embedded in 6-D, and their polygons in space."""
     surface = shapes.box((1.0, 0.7, 0.4), n=4)
     rng = np.random.default_rng(0)
     points = naive.embed(surface.points, 6, rng)
-    diagram, cells, _ = dual_case(surface, naive.random_sites(points, surface.faces, 30, rng), points)
-    return surface, cells, polygon_mesh(diagram, cells.of_polygon, surface.points)
+    cells, _ = dual_case(surface, naive.random_sites(points, surface.faces, 30, rng), points)
+    return surface, cells, cell_polygons(cells, surface.points)
 
 
 def area_of(loop):
@@ -50,10 +50,10 @@ def test_polygons_lie_in_space_and_cover_the_surface(exported):
     surface, cells, mesh = exported
     loops = [mesh.points[a:b] for a, b in zip(mesh.offset[:-1], mesh.offset[1:], strict=True)]
     assert sum(map(area_of, loops)) == pytest.approx(surface.area, rel=1e-12)
-    np.testing.assert_array_equal(np.unique(mesh.cell), np.arange(len(cells.site)))
+    np.testing.assert_array_equal(np.unique(mesh.cell), np.arange(cells.n_components))
     assert mesh.colour.min() >= 0
     assert mesh.colour.max() < N_COLOURS
-    for cell in range(len(cells.site)):
+    for cell in range(cells.n_components):
         assert len(set(mesh.colour[mesh.cell == cell].tolist())) == 1
 
 

@@ -1,4 +1,4 @@
-"""The kernels are plain Python too, so that coverage can be measured, and give the same result."""
+"""The kernels also run as plain Python, so that coverage can be measured, with the same result."""
 
 import os
 import subprocess
@@ -9,15 +9,16 @@ import numpy as np
 PROGRAM = """
 import numpy as np
 from anisomesh._kernels import predicates, warmup
+from anisomesh.voronoi.embedded_surface import EmbeddedSurface
 from anisomesh.voronoi.restricted import RestrictedVoronoi
 from anisomesh.shapes import analytic as shapes
 surface = shapes.box(n=1)
 sites = np.concatenate([surface.points[:5], 0.5 * (surface.points[:3] + surface.points[3:6])])
 sites = np.concatenate([sites, sites[:2] + 0.01])
-voronoi = RestrictedVoronoi(surface.points, surface.faces, threads=1)
-evaluation, diagram = voronoi.evaluate(sites, 7.0), voronoi.diagram(sites)
+voronoi = RestrictedVoronoi(EmbeddedSurface.in_space(surface), threads=1)
+energy, diagram = voronoi.integrate(sites, 7.0), voronoi.diagram(sites)
 np.savez(
-    {path!r}, gradient=evaluation.gradient, mass=evaluation.mass, label=diagram.label, site=diagram.site,
+    {path!r}, gradient=energy.gradient, mass=energy.mass, label=diagram.label, site=diagram.site,
     barycentric=diagram.barycentric, jit=hasattr(predicates.sign_of_sum, "py_func"), cached=warmup.kernels_cached(),
 )
 """

@@ -1,0 +1,9 @@
+"""Embedded surfaces of bare arrays."""
+
+from anisomesh.mesh.surface import Surface
+from anisomesh.voronoi.embedded_surface import EmbeddedSurface
+
+
+def embedded_surface(points, faces, scale=1.0):
+    """Return the surface of points (V, d) and faces (F, 3) whose first three coordinates are space times ``scale``."""
+    return EmbeddedSurface(Surface(points[:, :3] / scale, faces), points, scale=scale)
