@@ -13,59 +13,124 @@ import importlib
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
+    from anisomesh.conformance import ConformanceError, check_embedder, check_energy_gradient, check_metric_source
+    from anisomesh.cvt.energy import NormalMetric
+    from anisomesh.cvt.polygon_energy import energy_from_kernel
+    from anisomesh.cvt.schedule import CVTOptions, optimise_sites
+    from anisomesh.delaunay.meshing import MeshingTask, mesh_from_sites
+    from anisomesh.embedding.base import Embedding
+    from anisomesh.embedding.embedder import Direct
     from anisomesh.errors import AnisomeshError, MeshError, MeshFileError, MetricError, OptionError
     from anisomesh.evaluation.report import Evaluation, evaluate
+    from anisomesh.features.network import trace_features
     from anisomesh.io.meshes import load, save
+    from anisomesh.learn.inference.source import Hybrid, Neural
     from anisomesh.mesh.surface import Surface
+    from anisomesh.metric.field import MetricField
+    from anisomesh.metric.sources import Approximation, Curvature, Uniform
     from anisomesh.options import RemeshOptions
     from anisomesh.pipeline import remesh
     from anisomesh.progress import StepInfo
+    from anisomesh.repair.prepare import prepare
     from anisomesh.result import RemeshResult, save_rvd
     from anisomesh.shapes.analytic import sample
     from anisomesh.viz import side_by_side
+    from anisomesh.voronoi.embedded_surface import EmbeddedSurface
+    from anisomesh.voronoi.restricted import EnergyValue, RestrictedVoronoi
 
     __version__: str
 
+_MODULE_OF = {
+    # the main job
+    "remesh": "pipeline",
+    "RemeshOptions": "options",
+    "RemeshResult": "result",
+    "StepInfo": "progress",
+    # meshes in and out, judged and drawn
+    "Surface": "mesh.surface",
+    "load": "io.meshes",
+    "save": "io.meshes",
+    "save_rvd": "result",
+    "sample": "shapes.analytic",
+    "evaluate": "evaluation.report",
+    "Evaluation": "evaluation.report",
+    "side_by_side": "viz",
+    # the stages by themselves
+    "prepare": "repair.prepare",
+    "MetricField": "metric.field",
+    "Curvature": "metric.sources",
+    "Approximation": "metric.sources",
+    "Uniform": "metric.sources",
+    "Neural": "learn.inference.source",
+    "Hybrid": "learn.inference.source",
+    "Embedding": "embedding.base",
+    "Direct": "embedding.embedder",
+    "EmbeddedSurface": "voronoi.embedded_surface",
+    "RestrictedVoronoi": "voronoi.restricted",
+    "trace_features": "features.network",
+    "EnergyValue": "voronoi.restricted",
+    "NormalMetric": "cvt.energy",
+    "energy_from_kernel": "cvt.polygon_energy",
+    "CVTOptions": "cvt.schedule",
+    "optimise_sites": "cvt.schedule",
+    "MeshingTask": "delaunay.meshing",
+    "mesh_from_sites": "delaunay.meshing",
+    # conformance tests of plug-ins
+    "check_metric_source": "conformance",
+    "check_embedder": "conformance",
+    "check_energy_gradient": "conformance",
+    "ConformanceError": "conformance",
+    # errors
+    "AnisomeshError": "errors",
+    "MeshError": "errors",
+    "MeshFileError": "errors",
+    "MetricError": "errors",
+    "OptionError": "errors",
+}
+
 __all__ = [
     "AnisomeshError",
+    "Approximation",
+    "CVTOptions",
+    "ConformanceError",
+    "Curvature",
+    "Direct",
+    "EmbeddedSurface",
+    "Embedding",
+    "EnergyValue",
     "Evaluation",
+    "Hybrid",
     "MeshError",
     "MeshFileError",
+    "MeshingTask",
     "MetricError",
+    "MetricField",
+    "Neural",
+    "NormalMetric",
     "OptionError",
     "RemeshOptions",
     "RemeshResult",
+    "RestrictedVoronoi",
     "StepInfo",
     "Surface",
+    "Uniform",
     "__version__",
+    "check_embedder",
+    "check_energy_gradient",
+    "check_metric_source",
+    "energy_from_kernel",
     "evaluate",
     "load",
+    "mesh_from_sites",
+    "optimise_sites",
+    "prepare",
     "remesh",
     "sample",
     "save",
     "save_rvd",
     "side_by_side",
+    "trace_features",
 ]
-
-_HOME = {
-    "AnisomeshError": "errors",
-    "Evaluation": "evaluation.report",
-    "MeshError": "errors",
-    "MeshFileError": "errors",
-    "MetricError": "errors",
-    "OptionError": "errors",
-    "RemeshOptions": "options",
-    "RemeshResult": "result",
-    "StepInfo": "progress",
-    "Surface": "mesh.surface",
-    "evaluate": "evaluation.report",
-    "load": "io.meshes",
-    "remesh": "pipeline",
-    "sample": "shapes.analytic",
-    "save": "io.meshes",
-    "save_rvd": "result",
-    "side_by_side": "viz",
-}
 
 
 def __getattr__(name: str) -> Any:
@@ -74,8 +139,8 @@ def __getattr__(name: str) -> Any:
         from importlib.metadata import version
 
         value: Any = version("anisomesh")
-    elif name in _HOME:
-        value = getattr(importlib.import_module(f"anisomesh.{_HOME[name]}"), name)
+    elif name in _MODULE_OF:
+        value = getattr(importlib.import_module(f"anisomesh.{_MODULE_OF[name]}"), name)
     else:
         raise AttributeError(f"module 'anisomesh' has no attribute {name!r}")
     globals()[name] = value

@@ -1,26 +1,25 @@
 """Wrong usage is exit code 2, refused input exit code 1; one line on stderr, nothing on stdout, no file left."""
 
 import subprocess
+import sys
 from importlib.metadata import version
+from pathlib import Path
 
 import pytest
 
-from anisomesh.cli.main import main
 from conftest import CLI
 
 
 @pytest.fixture
-def refuse(capsys, monkeypatch, tmp_path):
-    """Run the command line in this process, in an empty folder, and check the manner of its refusal."""
-    monkeypatch.chdir(tmp_path)
+def refuse(run_cli, tmp_path):
+    """Run the command line in an empty folder and check the form of its refusal."""
 
     def run(code, *words):
-        assert main([str(word) for word in words]) == code
-        out, err = capsys.readouterr()
-        assert out == ""
-        line = err.splitlines()[-1]
+        done = run_cli(*words, cwd=tmp_path)
+        assert (done.returncode, done.stdout) == (code, "")
+        line = done.stderr.splitlines()[-1]
         assert line.startswith("anisomesh: error: ")
-        assert "Traceback" not in err
+        assert "Traceback" not in done.stderr
         return line
 
     return run
@@ -106,12 +105,24 @@ def test_unknown_command(refuse):
     assert "smooth" in refuse(2, "smooth")
 
 
-def test_version(run_cli):
-    process = run_cli("--version")
-    assert (process.returncode, process.stdout) == (0, f"anisomesh {version('anisomesh')}\n")
+@pytest.mark.slow
+@pytest.mark.parametrize("command", [[Path(sys.executable).with_name("anisomesh")], CLI], ids=["script", "module"])
+def test_the_entry_points_print_the_version(command):
+    done = subprocess.run([*command, "--version"], capture_output=True, text=True, timeout=60, check=True)
+    assert (done.stdout, done.stderr) == (f"anisomesh {version('anisomesh')}\n", "")
 
 
-def test_a_reader_that_goes_away_is_no_traceback(torus_obj):
+@pytest.mark.slow
+@pytest.mark.parametrize(("words", "code"), [(["info", "missing.ply"], 1), (["info"], 2)])
+def test_the_exit_code_of_the_process_is_the_one_of_the_command(run_process, tmp_path, words, code):
+    done = run_process(*words, cwd=tmp_path)
+    assert (done.returncode, done.stdout) == (code, "")
+    assert done.stderr.startswith("anisomesh: error: ")
+    assert len(done.stderr.splitlines()) == 1
+
+
+@pytest.mark.slow
+def test_a_closed_pipe_is_no_traceback(torus_obj):
     with subprocess.Popen([*CLI, "info", str(torus_obj)], stdout=subprocess.PIPE, stderr=subprocess.PIPE) as process:
         process.stdout.close()
         assert process.stderr.read() == b""

@@ -37,7 +37,8 @@ class NormalMetric:
 
     References
     ----------
-    NASM, section 3.3; Levy, Liu, "Lp centroidal Voronoi tessellation and its applications", TOG 2010.
+    NASM, energy of the normal-metric CVT; Levy, Liu, "Lp centroidal Voronoi tessellation and its applications", TOG
+    2010.
     """
 
     sharpness: float = 7.0

@@ -36,7 +36,7 @@ class DeltaComplex:
                 self._faces_at.setdefault(edge, []).append(face)
 
     def surplus_edges(self) -> list[int]:
-        """Return the edges that no simplicial complex has: from a point to itself, or second ones between two points."""
+        """Return the edges that no simplicial complex has: from a point to itself, or parallel to another one."""
         edges = np.array(self.face_edges).ravel()
         ends = np.sort(np.array(self.faces)[:, [[1, 2], [2, 0], [0, 1]]].reshape(-1, 2), axis=1)
         edges, first = np.unique(edges, return_index=True)

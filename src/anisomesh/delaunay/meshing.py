@@ -164,7 +164,7 @@ def mesh_from_sites(task: MeshingTask, sites: Sites) -> ValidMesh:
 
     References
     ----------
-    NASM, section 3.4; Edelsbrunner, Shah, "Triangulating topological spaces", 1997.
+    NASM, refinement of the dual; Edelsbrunner, Shah, "Triangulating topological spaces", 1997.
     """
     reference, n_start = task.reference, len(sites)
     best = trial = _attempt(task, sites, n_start)

@@ -34,7 +34,7 @@ class Curvature:
 
     References
     ----------
-    NASM, section 3.1; see :func:`~anisomesh.metric.tensors.curvature_metric`.
+    NASM, curvature metric M = R diag(1, r^2, 1) R^t; see :func:`~anisomesh.metric.tensors.curvature_metric`.
     """
 
     limits: tuple[float, float] = DEFAULT_LIMITS
