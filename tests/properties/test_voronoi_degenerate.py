@@ -3,27 +3,27 @@
 import naive_rvd as naive
 import numpy as np
 import pytest
+from embedded import embedded_surface
 from hypothesis import given
 from hypothesis import strategies as st
 
 from anisomesh.mesh.surface import Surface
 from anisomesh.shapes import analytic as shapes
-from anisomesh.voronoi.cells import cells_of
+from anisomesh.voronoi.cells import cell_complex
+from anisomesh.voronoi.embedded_surface import EmbeddedSurface
 from anisomesh.voronoi.restricted import RestrictedVoronoi
 from conftest import examples
 
 
 def special_points(surface):
-    """Return points, edge midpoints and face centres of a surface, coordinates of a grid exactly where it is one."""
+    """Return points, edge midpoints and face centres of a surface; on grids their coordinates are exact."""
     ends = surface.points[surface.edges]
     return np.concatenate([surface.points, 0.5 * (ends[:, 0] + ends[:, 1]), surface.points[surface.faces].mean(axis=1)])
 
 
 def diagram_and_cells(surface, sites):
-    voronoi = RestrictedVoronoi(surface.points, surface.faces)
-    diagram = voronoi.diagram(sites)
-    neighbours = Surface(surface.points, voronoi.faces).face_neighbours
-    return diagram, cells_of(diagram, neighbours, voronoi.facets.area)
+    diagram = RestrictedVoronoi(EmbeddedSurface.in_space(surface)).diagram(sites)
+    return diagram, cell_complex(diagram)
 
 
 def assert_partition(diagram):
@@ -60,7 +60,7 @@ def test_special_sites_with_duplicates_give_a_consistent_diagram(surface, n, see
 
 
 @pytest.mark.parametrize("seed", range(20))
-def test_many_sites_within_rounding_of_special_points_never_break_the_diagram(seed):
+def test_sites_within_rounding_of_special_points_never_break_the_diagram(seed):
     # Regression: the security radius ignored rounding, so that facets disagreed or could not be clipped.
     rng = np.random.default_rng(seed)
     surface = shapes.box(n=2)
@@ -77,9 +77,9 @@ def test_the_highest_of_equal_sites_owns_their_common_cell():
     diagram, _ = diagram_and_cells(surface, sites)
     owners = set(diagram.site.tolist())
     assert owners == set(range(40, 47)) | set(range(27, 40))
-    evaluation = RestrictedVoronoi(surface.points, surface.faces).evaluate(sites, 3.0)
-    assert set(np.flatnonzero(evaluation.mass).tolist()) == owners
-    assert np.isfinite(evaluation.gradient).all()
+    energy = RestrictedVoronoi(EmbeddedSurface.in_space(surface)).integrate(sites, 3.0)
+    assert set(np.flatnonzero(energy.mass).tolist()) == owners
+    assert np.isfinite(energy.gradient).all()
 
 
 def test_all_sites_at_one_place():
@@ -98,7 +98,7 @@ def test_a_bisector_along_mesh_edges_leaves_each_facet_to_one_side():
     np.testing.assert_array_equal(diagram.site[big], side[big].astype(int))
 
 
-def test_naive_predicates_and_diagram_break_a_tie_alike():
+def test_naive_predicates_and_diagram_break_ties_alike():
     # One facet whose corners are equally far from two sites: the higher index, with the smaller infinitesimal, owns it.
     surface = Surface(np.array([[0.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]]), np.array([[0, 1, 2]]))
     sites = np.array([[1.0, 0.0, 0.0], [-1.0, 0.0, 0.0]])
@@ -110,7 +110,7 @@ def test_naive_predicates_and_diagram_break_a_tie_alike():
 
 @pytest.mark.parametrize("seed", range(8))
 def test_sites_equally_far_from_a_tiny_surface(seed):
-    """Regression: the search tree rounds distances otherwise than the diagram, and gave a facet no owner for ever."""
+    """Regression: the search tree rounds distances differently from the diagram, and a facet never got an owner."""
     surface = shapes.sphere(1)
     rng = np.random.default_rng(seed)
     sites = rng.normal(size=(60, 8))
@@ -118,6 +118,6 @@ def test_sites_equally_far_from_a_tiny_surface(seed):
     sites = np.concatenate([sites, sites])
     points = np.zeros((surface.n_points, 8))
     points[:, :3] = 1e-15 * surface.points
-    diagram = RestrictedVoronoi(points, surface.faces).diagram(sites)
+    diagram = RestrictedVoronoi(embedded_surface(points, surface.faces)).diagram(sites)
     assert np.isin(np.arange(surface.n_faces), diagram.facet).all()
     assert diagram.site.min() >= 60

@@ -1,8 +1,9 @@
-"""The restricted Voronoi diagram of sites in general position, against brute force."""
+"""The restricted Voronoi diagram of sites in general position against brute force."""
 
 import naive_rvd as naive
 import numpy as np
 import pytest
+from embedded import embedded_surface
 from hypothesis import given
 from hypothesis import strategies as st
 
@@ -41,7 +42,7 @@ def assert_partition(diagram):
 
 
 def assert_nearest(diagram, rng):
-    """Random points of every polygon are nearest to the site of their polygon, to the rounding of squared distances."""
+    """Assert that the nearest site of random points of a polygon is its site, to rounding of squared distances."""
     size = np.diff(diagram.offset)
     for _ in range(4):
         weight = rng.exponential(size=len(diagram.label))
@@ -59,9 +60,9 @@ dimensions = pytest.mark.parametrize("dimension", [3, 6, 8])
 @cases
 @dimensions
 @pytest.mark.parametrize("n", [1, 2, 3, 4, 30, 700])
-def test_polygons_partition_every_facet_and_are_nearest_to_their_site(shape, dimension, n):
+def test_polygons_partition_every_facet_and_are_nearest_to_their_sites(shape, dimension, n):
     points, faces, sites = make(shape, dimension, n, seed=n)
-    diagram = RestrictedVoronoi(points, faces).diagram(sites)
+    diagram = RestrictedVoronoi(embedded_surface(points, faces)).diagram(sites)
     assert_partition(diagram)
     assert_nearest(diagram, np.random.default_rng(1))
 
@@ -76,7 +77,7 @@ def test_polygons_partition_every_facet_and_are_nearest_to_their_site(shape, dim
 )
 def test_polygons_agree_with_clipping_against_all_sites(shape, dimension, n, seed, lifted):
     points, faces, sites = make(shape, dimension, n, seed, lift=0.2 if lifted else 0.0)
-    diagram = RestrictedVoronoi(points, faces).diagram(sites)
+    diagram = RestrictedVoronoi(embedded_surface(points, faces)).diagram(sites)
     wanted = {key: naive.fraction(polygon) for key, polygon in naive.polygons(points, diagram.faces, sites).items()}
     found = dict(zip(zip(diagram.facet.tolist(), diagram.site.tolist(), strict=True), diagram.fractions, strict=True))
     assert {key for key, share in wanted.items() if share > 1e-12} == {
@@ -87,8 +88,10 @@ def test_polygons_agree_with_clipping_against_all_sites(shape, dimension, n, see
 
 
 def sides(diagram):
-    """Return {(facet, corner): (sites, breakpoints)} along the side opposite the corner, from the lower point to the
-    higher one; breakpoints are shares of the side."""
+    """Return {(facet, corner): (sites, breakpoints)} on the side opposite a corner, from its lower to its higher point.
+
+    Breakpoints are shares of the side.
+    """
     result = {}
     first = diagram.barycentric
     last = diagram.barycentric[diagram.following]
@@ -108,7 +111,7 @@ def sides(diagram):
 @dimensions
 def test_two_facets_agree_on_their_common_edge(shape, dimension):
     points, faces, sites = make(shape, dimension, 150, seed=5)
-    diagram = RestrictedVoronoi(points, faces).diagram(sites)
+    diagram = RestrictedVoronoi(embedded_surface(points, faces)).diagram(sites)
     along = sides(diagram)
     assert len(along) == 3 * len(faces)
     _, face_edges = topology.edges_of(diagram.faces)
@@ -126,9 +129,9 @@ def test_two_facets_agree_on_their_common_edge(shape, dimension):
 
 
 @dimensions
-def test_labels_say_which_bisectors_meet_in_a_vertex(dimension):
+def test_labels_name_the_bisectors_that_meet_in_a_vertex(dimension):
     points, faces, sites = make("torus", dimension, 200, seed=2)
-    diagram = RestrictedVoronoi(points, faces).diagram(sites)
+    diagram = RestrictedVoronoi(embedded_surface(points, faces)).diagram(sites)
     distance = np.linalg.norm(diagram.positions[:, None] - sites[None], axis=2)
     rows = np.arange(len(distance))
     own = distance[rows, diagram.site[diagram.polygon_of]]
@@ -148,13 +151,13 @@ def test_result_does_not_depend_on_the_number_of_threads(dimension, n):
     start, sites = (naive.random_sites(points, surface.faces, n, rng) for _ in range(2))
     results = []
     for threads in (1, 2, 3):
-        voronoi = RestrictedVoronoi(points, surface.faces, threads=threads)
-        voronoi.evaluate(start, 3.0)
-        results.append((voronoi.evaluate(sites, 3.0), voronoi.diagram(sites)))
-    for evaluation, diagram in results[1:]:
-        assert evaluation.energy == results[0][0].energy
-        for name in ("gradient", "mass", "cell_energy"):
-            np.testing.assert_array_equal(getattr(evaluation, name), getattr(results[0][0], name))
+        voronoi = RestrictedVoronoi(embedded_surface(points, surface.faces), threads=threads)
+        voronoi.integrate(start, 3.0)
+        results.append((voronoi.integrate(sites, 3.0), voronoi.diagram(sites)))
+    for energy, diagram in results[1:]:
+        assert energy.value == results[0][0].value
+        for name in ("gradient", "mass", "per_cell"):
+            np.testing.assert_array_equal(getattr(energy, name), getattr(results[0][0], name))
         assert_same(diagram, results[0][1])
 
 
@@ -163,27 +166,27 @@ def test_result_does_not_depend_on_the_number_of_threads(dimension, n):
 def test_history_changes_nothing_but_rounding(history, seed):
     points, faces, sites = make("torus", 6, 300, seed)
     rng = np.random.default_rng(seed)
-    fresh = RestrictedVoronoi(points, faces)
-    used = RestrictedVoronoi(points, faces)
+    fresh = RestrictedVoronoi(embedded_surface(points, faces))
+    used = RestrictedVoronoi(embedded_surface(points, faces))
     for n, size in history:
-        used.evaluate(sites[:n] + 10.0**size * rng.normal(size=(n, 6)), 2.0)
+        used.integrate(sites[:n] + 10.0**size * rng.normal(size=(n, 6)), 2.0)
     assert_same(used.diagram(sites), fresh.diagram(sites))
-    one, other = used.evaluate(sites, 2.0), fresh.evaluate(sites, 2.0)
+    one, other = used.integrate(sites, 2.0), fresh.integrate(sites, 2.0)
     np.testing.assert_allclose(one.gradient, other.gradient, atol=1e-13)
     np.testing.assert_allclose(one.mass, other.mass, atol=1e-13)
-    assert one.energy == pytest.approx(other.energy, rel=1e-12)
+    assert one.value == pytest.approx(other.value, rel=1e-12)
 
 
-def test_small_steps_as_of_an_optimiser_give_the_diagram_of_a_fresh_start():
+def test_many_small_steps_give_the_diagram_of_a_fresh_start():
     points, faces, sites = make("torus", 3, 800, 11)
     rng = np.random.default_rng(4)
-    used = RestrictedVoronoi(points, faces)
+    used = RestrictedVoronoi(embedded_surface(points, faces))
     for _ in range(40):
         step = 0.01 * rng.normal(size=sites.shape)
         step[rng.random(len(sites)) < 0.02] *= 20  # a few fast sites
         sites = sites + step
-        used.evaluate(sites)
-    assert_same(used.diagram(sites), RestrictedVoronoi(points, faces).diagram(sites))
+        used.integrate(sites)
+    assert_same(used.diagram(sites), RestrictedVoronoi(embedded_surface(points, faces)).diagram(sites))
 
 
 @dimensions
@@ -192,23 +195,23 @@ def test_many_more_sites_than_facets(dimension):
     surface = shapes.sphere(0)
     points = naive.embed(surface.points, dimension, rng)
     sites = naive.random_sites(points, surface.faces, 2000, rng)
-    voronoi = RestrictedVoronoi(points, surface.faces)
+    voronoi = RestrictedVoronoi(embedded_surface(points, surface.faces))
     diagram = voronoi.diagram(sites)
     assert_partition(diagram)
     assert_nearest(diagram, rng)
-    assert voronoi.evaluate(sites).mass.sum() == pytest.approx(naive.areas(points, surface.faces).sum(), rel=1e-12)
+    assert voronoi.integrate(sites).mass.sum() == pytest.approx(naive.areas(points, surface.faces).sum(), rel=1e-12)
 
 
 @pytest.mark.parametrize("dimension", [3, 8])
 @pytest.mark.parametrize("scale", [1e-3, 1e-6, 1e-8, 1e-9])
 def test_clustered_sites(dimension, scale):
-    # Regression: next to the rounding of squared distances the security radius was too small.
+    # Regression: the security radius ignored the rounding of squared distances.
     rng = np.random.default_rng(6)
     surface = shapes.torus(n_major=9, n_minor=5)
     points = naive.embed(surface.points, dimension, rng)
     centres = naive.random_sites(points, surface.faces, 3, rng)
     sites = centres[rng.integers(3, size=300)] + scale * rng.normal(size=(300, dimension))
-    diagram = RestrictedVoronoi(points, surface.faces).diagram(sites)
+    diagram = RestrictedVoronoi(embedded_surface(points, surface.faces)).diagram(sites)
     assert_partition(diagram)
     assert_nearest(diagram, rng)
 
@@ -216,27 +219,27 @@ def test_clustered_sites(dimension, scale):
 @examples(25)
 @given(st.integers(0, 2**32), st.sampled_from([3, 6, 8]), st.integers(100, 400))
 def test_sites_at_all_scales_around_one_point(seed, dimension, n):
-    # Regression: as above.
+    # Regression: the security radius ignored the rounding of squared distances.
     rng = np.random.default_rng(seed)
     surface = shapes.torus(n_major=8, n_minor=5)
     points = naive.embed(surface.points, dimension, rng)
     centre = naive.random_sites(points, surface.faces, 1, rng)
     sites = centre + rng.normal(size=(n, dimension)) * 10.0 ** rng.uniform(-11, 0, size=(n, 1))
-    diagram = RestrictedVoronoi(points, surface.faces).diagram(sites)
+    diagram = RestrictedVoronoi(embedded_surface(points, surface.faces)).diagram(sites)
     assert_partition(diagram)
     assert_nearest(diagram, rng)
 
 
-def test_order_maps_the_faces_of_the_diagram_to_those_given():
+def test_face_order_maps_the_faces_of_the_diagram_to_the_input_faces():
     points, faces, _ = make("torus", 3, 1, 0)
-    voronoi = RestrictedVoronoi(points, faces)
-    np.testing.assert_array_equal(np.sort(voronoi.order), np.arange(len(faces)))
-    np.testing.assert_array_equal(faces[voronoi.order], voronoi.faces)
+    embedded = embedded_surface(points, faces)
+    np.testing.assert_array_equal(np.sort(embedded.face_order), np.arange(len(faces)))
+    np.testing.assert_array_equal(faces[embedded.face_order], embedded.faces)
 
 
-def test_polygon_index_finds_every_polygon_and_nothing_else():
+def test_polygon_index_finds_exactly_the_polygons():
     points, faces, sites = make("sphere", 3, 40, 0)
-    diagram = RestrictedVoronoi(points, faces).diagram(sites)
+    diagram = RestrictedVoronoi(embedded_surface(points, faces)).diagram(sites)
     facet, site = (table.ravel() for table in np.meshgrid(np.arange(len(faces)), np.arange(40), indexing="ij"))
     found = diagram.polygon_index(facet, site)
     np.testing.assert_array_equal(np.sort(found[found >= 0]), np.arange(len(diagram.site)))
@@ -244,9 +247,9 @@ def test_polygon_index_finds_every_polygon_and_nothing_else():
     np.testing.assert_array_equal(diagram.site[found[found >= 0]], site[found >= 0])
 
 
-def test_point_at_is_the_corner_that_a_vertex_is():
+def test_point_at_names_the_surface_point_at_a_vertex():
     points, faces, sites = make("torus", 3, 12, 0)
-    diagram = RestrictedVoronoi(points, faces).diagram(sites)
+    diagram = RestrictedVoronoi(embedded_surface(points, faces)).diagram(sites)
     point = diagram.point_at(np.arange(len(diagram.label)))
     np.testing.assert_array_equal(point >= 0, (diagram.barycentric == 1.0).any(axis=1))
     np.testing.assert_array_equal(diagram.positions[point >= 0], points[point[point >= 0]])
@@ -255,25 +258,25 @@ def test_point_at_is_the_corner_that_a_vertex_is():
 
 def test_layout_and_writability_of_the_arrays_do_not_matter_and_compile_nothing_new():
     points, faces, sites = make("sphere", 3, 20, 0)
-    plain = RestrictedVoronoi(points, faces).evaluate(sites)
+    plain = RestrictedVoronoi(embedded_surface(points, faces)).integrate(sites)
     n_compiled = len(integrate.integrate_chunk.signatures)
     frozen = np.asfortranarray(sites)
     frozen.flags.writeable = False
     fixed = np.array(points, order="F")
     fixed.flags.writeable = False
-    voronoi = RestrictedVoronoi(fixed, faces.astype(np.int64))
-    np.testing.assert_array_equal(voronoi.evaluate(frozen).gradient, plain.gradient)
+    voronoi = RestrictedVoronoi(embedded_surface(fixed, faces.astype(np.int64)))
+    np.testing.assert_array_equal(voronoi.integrate(frozen).gradient, plain.gradient)
     assert len(integrate.integrate_chunk.signatures) == n_compiled
     assert frozen.flags.f_contiguous
     whole = np.round(sites * 4).astype(np.int64)
-    np.testing.assert_array_equal(voronoi.evaluate(whole).mass, voronoi.evaluate(whole.astype(float)).mass)
+    np.testing.assert_array_equal(voronoi.integrate(whole).mass, voronoi.integrate(whole.astype(float)).mass)
 
 
 def test_wrong_shapes_and_options_are_refused():
     points, faces, sites = make("sphere", 6, 5, 0)
-    voronoi = RestrictedVoronoi(points, faces)
+    voronoi = RestrictedVoronoi(embedded_surface(points, faces))
     for wrong in (sites[:, :3], sites[:0], sites[0]):
         with pytest.raises(OptionError, match=r"expected \(S, 6\)"):
-            voronoi.evaluate(wrong)
+            voronoi.integrate(wrong)
     with pytest.raises(OptionError, match="threads = 0"):
-        RestrictedVoronoi(points, faces, threads=0)
+        RestrictedVoronoi(embedded_surface(points, faces), threads=0)
