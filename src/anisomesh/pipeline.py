@@ -12,12 +12,12 @@ import numpy as np
 import numpy.typing as npt
 
 from anisomesh._arrays import EdgeMask, PointScalars, PointTensors
-from anisomesh.cvt.lbfgs import Optimised, Status
+from anisomesh.caveats import caveats
 from anisomesh.cvt.schedule import DualFeedback, optimise_sites
 from anisomesh.deadline import Deadline
 from anisomesh.delaunay.creases import missing_on_creases
 from anisomesh.delaunay.dual import dual_squared_errors
-from anisomesh.delaunay.meshing import MeshingTask, ValidMesh, mesh_from_sites
+from anisomesh.delaunay.meshing import MeshingTask, mesh_from_sites
 from anisomesh.embedding.embedder import checked_embedding
 from anisomesh.errors import MetricError, OptionError, TimeLimitError
 from anisomesh.features.detect import sharp_edges
@@ -27,7 +27,7 @@ from anisomesh.io.convert import as_surface
 from anisomesh.memory import check_memory
 from anisomesh.mesh.geometry import unit_frame
 from anisomesh.mesh.surface import Surface
-from anisomesh.mesh.validity import Validity, check_validity
+from anisomesh.mesh.validity import check_validity
 from anisomesh.mesh.working_surface import working_surface
 from anisomesh.metric.field import checked_field
 from anisomesh.options import RemeshOptions
@@ -39,8 +39,7 @@ from anisomesh.search import MIN_VERTICES, smallest_within
 from anisomesh.voronoi.embedded_surface import EmbeddedSurface
 from anisomesh.voronoi.restricted import RestrictedVoronoi
 
-COUNT_TOLERANCE = 0.02  # share of the asked vertices by which the result may differ without a warning
-OPTIMISATION_SHARE = 0.6  # of the time limit is for all up to the end of the optimisation
+OPTIMISATION_SHARE = 0.6  # of the time limit, for everything up to the end of the optimisation
 
 
 def remesh(
@@ -69,7 +68,7 @@ def remesh(
         Instead of ``n_vertices``: vertices as a share of those of the prepared input.
     max_error
         Instead of ``n_vertices``: the largest distance between the surfaces, both ways, in model units. The smallest
-        number of vertices that does is searched for, to 3 %, by remeshing several times; noise is not taken away.
+        sufficient number of vertices is found, to 3 %, by remeshing several times; noise is not removed.
     options
         See :class:`RemeshOptions`; keyword arguments of the same names take precedence.
     on_step
@@ -78,17 +77,16 @@ def remesh(
     Returns
     -------
     RemeshResult
-        The mesh and everything it was made from. Where a valid mesh takes more vertices than asked for,
-        ``warnings`` says so.
+        The mesh and everything it was made from; ``warnings`` says where it differs from what was asked for.
 
     Raises
     ------
     MeshError
-        If the input is no mesh, or nothing of it is left after the repair.
+        If the input is not a mesh, or nothing is left of it after the repair.
     MetricError
-        If given tensors are not symmetric positive definite.
+        If tensors are not symmetric positive definite, or a metric source returns something else.
     OptionError
-        If an option is out of range, or no number of vertices within reason keeps to the error.
+        If an option is out of range, or even four times the vertices of the input exceed ``max_error``.
     TimeLimitError
         If the time limit was over before the optimisation began.
 
@@ -214,7 +212,7 @@ def _remesh(source: _Input, n: int, options: RemeshOptions, run: _Run) -> Remesh
         removed=mesh.removed,
         validity=validity,
         seconds=run.total_seconds(),
-        warnings=tuple(_warnings(n, field.noise, mesh, validity, optimised, options)),
+        warnings=tuple(caveats(n, field.noise, mesh, validity, optimised, options)),
     )
 
 
@@ -282,31 +280,3 @@ def _at_prepared(name: str, values: Any, shape: tuple[int, ...], prepared: Prepa
         return np.asarray(np.asarray(values, dtype=np.float64)[prepared.point_source])
     except (TypeError, ValueError) as error:
         raise MetricError(f"{name} cannot be read as numbers: {error}") from error
-
-
-def _warnings(
-    n: int, noise: float, mesh: ValidMesh, validity: Validity, optimised: Optimised, options: RemeshOptions
-) -> Iterator[str]:
-    """Yield what a user should know about the result."""
-    n_points = len(mesh.points)
-    if noise > 0.0:
-        yield f"noise of {noise:.2f} mean edge lengths was removed first; the result follows the denoised surface"
-    if optimised.status is Status.TIME_LIMIT:
-        count = optimised.iterations
-        yield f"the time limit of {options.time_limit:g} s ended the optimisation after {count} iterations"
-    if mesh.from_input:
-        yield (
-            f"{n:,} vertices are too few for the topology of the surface; the input itself was coarsened instead, and "
-            "its triangles do not follow the metric: ask for more vertices"
-        )
-    if abs(n_points - n) > COUNT_TOLERANCE * n:
-        why = "fewer would fold the surface or change its topology" if n_points > n else "it has no more"
-        yield f"{n_points:,} vertices instead of {n:,}: {why}"
-    if validity.euler != validity.euler_input:
-        yield f"the Euler characteristic is {validity.euler} instead of {validity.euler_input}; ask for more vertices"
-    if validity.flat:
-        yield f"{validity.flat:,} triangles have no area"
-    if validity.inverted:
-        yield f"{validity.inverted:,} triangles are inverted against the input surface"
-    if validity.new_intersections:
-        yield f"{validity.new_intersections:,} pairs of triangles intersect where the input does not"

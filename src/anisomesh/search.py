@@ -12,18 +12,18 @@ from anisomesh.mesh.distance import surface_distance
 from anisomesh.mesh.surface import Surface
 from anisomesh.result import RemeshResult
 
-MIN_VERTICES = 4
-MAX_RUNS = 16
-CLOSE = 1.03  # the search ends when a count this much smaller is known not to do
-FIRST_RATIO = 0.1  # of the vertices of the surface, for the first run
-MOST_RATIO, MOST_MORE = 4, 1_000  # so many times the vertices of the surface, and so many more, is the largest count
-SAMPLES = 50_000  # points on each surface that distances are taken from, besides vertices and middles of edges
+MIN_VERTICES = 4  # a tetrahedron
+MAX_SEARCH_RUNS = 16  # heuristic; ten are usual
+COUNT_PRECISION = 1.03  # the search ends when a count smaller by this factor is known to be too small
+FIRST_RATIO = 0.1  # vertices per vertex of the surface, for the first run; heuristic
+MAX_RATIO, MAX_MORE = 4, 1_000  # largest count: ratio times the vertices of the surface, and more
+DISTANCE_SAMPLES = 50_000  # points on each surface besides vertices and edge midpoints
 
 
 def smallest_within(
     remesh: Callable[[int], RemeshResult], surface: Surface, max_error: float, deadline: Deadline
 ) -> RemeshResult:
-    """Return the smallest remesh found whose distance from the surface, both ways, is at most ``max_error``.
+    """Return the smallest remesh found with a distance to the surface, both ways, of at most ``max_error``.
 
     Parameters
     ----------
@@ -32,28 +32,28 @@ def smallest_within(
     surface
         The surface that is remeshed.
     max_error
-        Largest distance, in its units.
+        Largest distance, in the units of the surface.
     deadline
-        The search ends when its limit is over, if there is a result that does.
+        The search ends when it has passed, if a sufficient result is known.
 
     Raises
     ------
     OptionError
-        If not even four times as many vertices as the surface has do.
+        If four times the vertices of the surface are not enough.
     TimeLimitError
-        If the limit is over before any result does.
+        If the deadline passes before any sufficient result.
     """
     results: dict[int, RemeshResult] = {}
 
     def error_at(n: int) -> float:
         result = remesh(n)
-        error = surface_distance(surface, result.surface, SAMPLES).hausdorff
+        error = surface_distance(surface, result.surface, DISTANCE_SAMPLES).hausdorff
         if error <= max_error:
             results.clear()
-            results[n] = replace(result, distance=error)  # of the results only the last that does is kept
+            results[n] = replace(result, distance=error)  # only the last sufficient result is kept
         return error
 
-    most = MOST_RATIO * surface.n_points + MOST_MORE
+    most = MAX_RATIO * surface.n_points + MAX_MORE
     first = max(MIN_VERTICES, round(FIRST_RATIO * surface.n_points))
     try:
         n, error = smallest_count(error_at, max_error, first, MIN_VERTICES, most, stop=deadline.passed)
@@ -83,29 +83,29 @@ def smallest_count(
     Parameters
     ----------
     error_at
-        The error for a count; it falls as the count grows, about as a power of it, but not at every step.
+        The error for a count; it decreases about as a power of the count, not monotonically.
     max_error
         The error allowed.
     first, least, most
         The first count tried, the smallest, and the largest.
     stop
-        Whether to end with what there is, asked once some count is known to do.
+        Whether to end now, asked once a sufficient count is known.
 
     Returns
     -------
     n, error
-        A count that does, unless ``most`` (or the last count tried) has a larger error.
+        A sufficient count, unless ``most`` (or the last count tried) has a larger error.
 
     Notes
     -----
-    Counts that do not do and counts that do close in on the answer, by the secant through both in logarithms, with
-    steps to both sides of it so that both ends move. It ends when they are within 3 % of each other.
+    The answer is bracketed by a too small and a sufficient count, and the bracket shrunk by the secant through both in
+    logarithms, until its ends are within 3 % of each other.
     """
     n = min(max(first, least), most)
     error = error_at(n)
     low: tuple[int, float] | None = None
     high: tuple[int, float] | None = None
-    for _ in range(MAX_RUNS):
+    for _ in range(MAX_SEARCH_RUNS):
         if error <= max_error:
             high = n, error
         else:
@@ -123,7 +123,7 @@ def smallest_count(
 
 
 def _close(low: int, high: int) -> bool:
-    return high <= low + 1 or high <= CLOSE * low
+    return high <= low + 1 or high <= COUNT_PRECISION * low
 
 
 def _next(

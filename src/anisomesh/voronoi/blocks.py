@@ -7,8 +7,8 @@ import numpy.typing as npt
 
 Floats = npt.NDArray[np.float64]
 
-_BLOCK = 64  # points in a block, at least
-_MAX_BLOCKS = 128
+_MIN_BLOCK_SIZE = 64  # points; performance only
+_MAX_BLOCKS = 128  # pairs of blocks are compared; performance only
 
 
 class Blocks:
@@ -25,7 +25,7 @@ class Blocks:
     """
 
     def __init__(self, points: Floats) -> None:
-        size = max(_BLOCK, -(-len(points) // _MAX_BLOCKS))
+        size = max(_MIN_BLOCK_SIZE, -(-len(points) // _MAX_BLOCKS))
         parts, done = [np.arange(len(points))], []
         while parts:
             part = parts.pop()

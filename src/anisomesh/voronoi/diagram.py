@@ -33,8 +33,7 @@ class Diagram:
     offset
         First vertex of each polygon (P + 1,).
     label
-        What bounds each edge (Q,): the site behind a bisector, or -1 - c for the side of the facet opposite
-        corner c.
+        Line of each edge (Q,): the site behind a bisector, or -1 - c for the side of the facet opposite corner c.
     barycentric
         Coordinates of the vertices in their facet (Q, 3).
     """

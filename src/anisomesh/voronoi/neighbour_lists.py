@@ -14,15 +14,16 @@ from anisomesh._kernels.neighbours import age_lists, displacements, limit_radius
 from anisomesh.voronoi.blocks import Blocks
 from anisomesh.voronoi.threads import Workers
 
-_BASE_NEIGHBOURS = 32
-_FAR = 0.45  # of the median list radius: when a site is this far from its anchor, sites are anchored anew
-_NEAR = 0.1  # and these are the ones farther from their anchors than this
-_MOST = 0.05  # of all sites; if more are to be anchored anew, all lists are rebuilt
-_SPARE = 1.3  # a list that proves too short is made this much longer than needed
-_CROWDED = 2  # times the room that the lists in use take; then, too
-_LONGEST_KEPT = 96  # a rebuild shortens longer lists to this
-_ENOUGH_FOR_THREADS = 2_000  # sites; fewer are done before another thread has begun
-_STALE = 0.02  # of its radius, by which distances in a list may be out of date
+# performance only: no value changes a result beyond rounding (benchmarks/speed.py)
+_BASE_NEIGHBOURS = 32  # entries of a new list
+_MAX_ANCHOR_DISTANCE = 0.45  # median list radii: when a site is this far from its anchor, sites are anchored anew,
+_REANCHOR_DISTANCE = 0.1  # namely the ones farther from their anchors than this
+_MAX_REANCHORED = 0.05  # share of all sites; if more are to be anchored anew, all lists are rebuilt
+_GROWTH_MARGIN = 1.3  # ratio of the new radius of a list that proved too short to the radius needed
+_MAX_WASTE = 2  # ratio of the memory of all lists to the memory in use, from which on they are rebuilt
+_MAX_KEPT_LENGTH = 96  # entries to which a rebuild shortens longer lists
+_MIN_SITES_FOR_THREADS = 2_000  # fewer are done before another thread has started
+_MAX_AGE = 0.02  # list radii by which the distances in a list may be out of date
 _PROBES = 4  # newly anchored sites that are looked for near every other site
 
 Floats = npt.NDArray[np.float64]
@@ -34,14 +35,17 @@ class NeighbourLists:
 
     Notes
     -----
-    Every site i has an anchor a_i, where it once was, and a radius r_i; its list holds every site whose anchor is
-    within r_i of a_i. Hence it holds every site that is *now* within r_i - |x_i - a_i| - max_j |x_j - a_j| of the
-    site (after Verlet 1967), where j runs over the sites in blocks near by; those in others are too far to matter.
-    So most calls need no search. The distances in a list, and its order, may be out of date by a bound that adds up
-    the steps since they were computed; when that grows beyond a share of the radius they are computed again, and the
-    list, almost sorted, is sorted. When a site has moved far it is anchored anew where it is, with a new list; another
-    site that has it in its list loses nothing, one that has not gets a smaller radius. A list that proves too short is
-    sought again, longer, among the anchors.
+    Every site i has an anchor a_i, an earlier position, and a radius r_i; its list contains every site whose anchor is
+    within r_i of a_i. Hence it contains every site that is *now* within r_i - |x_i - a_i| - max_j |x_j - a_j|, where j
+    runs over the sites in nearby blocks; sites in other blocks are too far to matter. So most calls need no search. The
+    distances in a list, and its order, may be out of date by a bound that sums the steps since they were computed; when
+    it exceeds a share of the radius they are recomputed, and the almost sorted list is sorted. A site that has moved
+    far gets a new anchor and a new list; other sites that have it in their lists keep their radius, the rest get a
+    smaller one. A list that proves too short is replaced by a longer one, found among the anchors.
+
+    References
+    ----------
+    Verlet, "Computer experiments on classical fluids", Physical Review 1967.
     """
 
     def __init__(self, workers: Workers) -> None:
@@ -51,7 +55,7 @@ class NeighbourLists:
         self._anchors: Floats
         self._moved: Floats
         self._radius: Floats
-        self._filled: Floats  # the radius when the list was last sought
+        self._filled: Floats  # the radius when the list was last searched for
         self._distance: Floats
         self._stale: Floats  # by how much the distances in each list may have changed
         self._counts: npt.NDArray[np.int64]
@@ -71,11 +75,11 @@ class NeighbourLists:
         if len(sites) != self.n_sites:
             self._rebuild(sites)
         self._moved = np.empty(self.n_sites)
-        if displacements(sites, self._anchors, self._moved) > _FAR * self._typical:
-            restless = self._blocks.largest(self._moved) > _FAR * self._typical
-            movers = np.flatnonzero(restless[self._blocks.of] & (self._moved > _NEAR * self._typical))
-            crowded = self._used > _CROWDED * self._counts.sum()
-            if crowded or len(movers) > _MOST * self.n_sites:
+        if displacements(sites, self._anchors, self._moved) > _MAX_ANCHOR_DISTANCE * self._typical:
+            restless = self._blocks.largest(self._moved) > _MAX_ANCHOR_DISTANCE * self._typical
+            movers = np.flatnonzero(restless[self._blocks.of] & (self._moved > _REANCHOR_DISTANCE * self._typical))
+            crowded = self._used > _MAX_WASTE * self._counts.sum()
+            if crowded or len(movers) > _MAX_REANCHORED * self.n_sites:
                 self._rebuild(sites)
             else:
                 self._anchor(sites, movers)
@@ -91,7 +95,7 @@ class NeighbourLists:
         The positions must be those of the last call of ``table``.
         """
         short = np.flatnonzero(needed)
-        wanted = _SPARE * needed[short] + self._worn()[short]
+        wanted = _GROWTH_MARGIN * needed[short] + self._worn()[short]
         limited = self._radius[short] < self._filled[short]  # a search as long as the last may do
         counts = np.minimum(np.where(limited, 1, 2) * self._counts[short], self.n_sites - 1)
         while len(short):
@@ -148,7 +152,7 @@ class NeighbourLists:
         self._reach = None
         self._radius, self._filled = np.empty(self.n_sites), np.empty(self.n_sites)
         self._start = np.zeros(self.n_sites, dtype=np.int64)
-        counts = np.clip(self._counts, base, _LONGEST_KEPT)
+        counts = np.clip(self._counts, base, _MAX_KEPT_LENGTH)
         self._used = 0
         self._neighbours = np.zeros(2 * counts.sum(), dtype=np.int32)
         self._distance = np.zeros(2 * counts.sum())
@@ -196,7 +200,7 @@ class NeighbourLists:
         if count == 0:
             self._radius[group] = self._filled[group] = np.inf
             return np.zeros((len(group), 0), dtype=np.int32)
-        workers = self._workers.threads if len(group) > _ENOUGH_FOR_THREADS else 1
+        workers = self._workers.threads if len(group) > _MIN_SITES_FOR_THREADS else 1
         distance, index = self._tree.query(self._anchors[group], count + 1, workers=workers)
         others = index != group[:, None]
         others[others.all(axis=1), -1] = False
@@ -209,7 +213,7 @@ class NeighbourLists:
         steps = np.empty(self.n_sites)
         displacements(sites, self._sites, steps)
         self._sites = np.array(sites)
-        limit = np.where(np.isfinite(self._radius), _STALE * self._radius, 0.0)
+        limit = np.where(np.isfinite(self._radius), _MAX_AGE * self._radius, 0.0)
         lists = (self._start, self._counts, self._neighbours, self._distance, self._stale)
         self._share(np.arange(self.n_sites), lambda part: age_lists(part, steps, limit, sites, *lists))
 
@@ -219,5 +223,5 @@ class NeighbourLists:
 
     def _share(self, which: Rows, work: Callable[[Rows], None]) -> None:
         """Let the workers do the work on these sites."""
-        parts = self._workers.threads if len(which) > _ENOUGH_FOR_THREADS else 1
+        parts = self._workers.threads if len(which) > _MIN_SITES_FOR_THREADS else 1
         self._workers.map(lambda _, part: work(part), np.array_split(which, parts))

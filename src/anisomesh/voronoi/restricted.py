@@ -17,10 +17,11 @@ from anisomesh.voronoi.embedded_surface import EmbeddedSurface
 from anisomesh.voronoi.neighbour_lists import NeighbourLists
 from anisomesh.voronoi.threads import Workers
 
-# facets in a chunk; it depends on their number alone, so that sums do not depend on the number of threads, and is
-# large, because a thread that comes back from a kernel may wait long for the interpreter
+# facets per chunk: depends only on their number, so that sums do not depend on the number of threads; large, because a
+# thread that returns from a kernel may wait for the interpreter (benchmarks/speed.py)
 _MIN_CHUNK, _MAX_CHUNK, _MIN_CHUNKS = 1024, 4096, 4
-_MAX_ROUNDS = 40
+_MAX_REPAIR_ROUNDS = 40  # each doubles buffers or lengthens lists, so far fewer suffice for any memory
+_INITIAL_BUFFER_SIZE = 64  # polygon vertices per facet
 
 _T = TypeVar("_T")
 Chunk = npt.NDArray[np.int32]  # facets
@@ -67,11 +68,10 @@ class RestrictedVoronoi:
 
     Notes
     -----
-    The diagram on a facet is the lower envelope of planes over a triangle (see ``_kernels.clip``), so the
-    dimension enters only in a table of squared distances and all predicates are those of 2-D. The object
-    remembers neighbour lists and one owner per facet from call to call; they change the time an evaluation
-    takes and never its value beyond rounding. An evaluation costs O(F + S) for a bounded number of
-    neighbours.
+    The diagram on a facet is the lower envelope of planes over a triangle (see ``_kernels.clip``), so the dimension
+    enters only in a table of squared distances, and all predicates are two-dimensional. Neighbour lists and one owner
+    per facet are kept from call to call; they change the time of an evaluation and its value only by rounding. An
+    evaluation costs O(F + S) for a bounded number of neighbours.
 
     References
     ----------
@@ -90,7 +90,7 @@ class RestrictedVoronoi:
         self._lists = NeighbourLists(self._workers)
         self._owners = np.zeros(0, dtype=np.int32)
         self._buffers: list[_Buffers] = []
-        self._size = 64
+        self._size = _INITIAL_BUFFER_SIZE
 
     def integrate(self, sites: Sites, sharpness: float = 1.0) -> EnergyValue:
         """Return the energy of the CVT with the normal metric I + (s - 1) N N^t, times the density, and its gradient.
@@ -166,7 +166,7 @@ class RestrictedVoronoi:
         """Run the work on all facets by chunks, and again on the facets with problems once their cause is removed."""
         facets = np.arange(self.embedded.surface.n_faces, dtype=np.int32)
         parts: list[_T] = []
-        for _ in range(_MAX_ROUNDS):
+        for _ in range(_MAX_REPAIR_ROUNDS):
             chunks = np.split(facets, np.arange(self._chunk, len(facets), self._chunk))
             results = self._workers.map(lambda thread, chunk: work(chunk, self._buffers[thread]), chunks)
             parts.extend(part for part, _ in results)

@@ -1,0 +1,40 @@
+"""What a user should know about a result."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+from anisomesh.cvt.lbfgs import Optimised, Status
+from anisomesh.delaunay.meshing import ValidMesh
+from anisomesh.mesh.validity import Validity
+from anisomesh.options import RemeshOptions
+
+COUNT_TOLERANCE = 0.02  # share of the vertices asked for by which a result may differ without a remark
+
+
+def caveats(
+    n: int, noise: float, mesh: ValidMesh, validity: Validity, optimised: Optimised, options: RemeshOptions
+) -> Iterator[str]:
+    """Yield one sentence for everything that a user should know about a result of n vertices asked for."""
+    n_points = len(mesh.points)
+    if noise > 0.0:
+        yield f"noise of {noise:.2f} mean edge lengths was removed first; the result follows the denoised surface"
+    if optimised.status is Status.TIME_LIMIT:
+        count = optimised.iterations
+        yield f"the time limit of {options.time_limit:g} s ended the optimisation after {count} iterations"
+    if mesh.from_input:
+        yield (
+            f"{n:,} vertices are too few for the topology of the surface; the input itself was coarsened instead, and "
+            "its triangles do not follow the metric: ask for more vertices"
+        )
+    if abs(n_points - n) > COUNT_TOLERANCE * n:
+        why = "fewer would fold the surface or change its topology" if n_points > n else "it has no more"
+        yield f"{n_points:,} vertices instead of {n:,}: {why}"
+    if validity.euler != validity.euler_input:
+        yield f"the Euler characteristic is {validity.euler} instead of {validity.euler_input}; ask for more vertices"
+    if validity.flat:
+        yield f"{validity.flat:,} triangles have no area"
+    if validity.inverted:
+        yield f"{validity.inverted:,} triangles are inverted against the input surface"
+    if validity.new_intersections:
+        yield f"{validity.new_intersections:,} pairs of triangles intersect where the input does not"
