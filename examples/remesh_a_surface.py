@@ -1,6 +1,6 @@
-"""Remesh a surface, look at the report, write the mesh and a picture.
+"""Remesh a surface, look at the report, write the mesh and a picture coloured by the stretch of the triangles.
 
-Run it with the file to remesh, or without for a built-in sample (extra: picture):
+Run it with the file to remesh, or without one for a knotted tube (extra: picture):
 
     python examples/remesh_a_surface.py bunny.obj
 """
@@ -9,10 +9,11 @@ import sys
 from pathlib import Path
 
 import anisomesh
+from anisomesh.viz import stretch_colouring
 
 
-def main(source: Path | None, folder: Path, n_vertices: int = 1000) -> anisomesh.RemeshResult:
-    surface = anisomesh.sample() if source is None else anisomesh.load(source)
+def main(source: Path | None, folder: Path, n_vertices: int = 800) -> anisomesh.RemeshResult:
+    surface = anisomesh.sample("knot") if source is None else anisomesh.load(source)
     result = anisomesh.remesh(surface, n_vertices=n_vertices)
 
     report = result.report()
@@ -22,7 +23,7 @@ def main(source: Path | None, folder: Path, n_vertices: int = 1000) -> anisomesh
         print("warning:", warning)
 
     anisomesh.save(result.surface, folder / "remeshed.ply")
-    anisomesh.side_by_side(surface, result.surface, folder / "remeshed.png")
+    anisomesh.side_by_side(surface, result.surface, folder / "remeshed.png", values=stretch_colouring(result.surface))
     return result
 
 

@@ -11,6 +11,7 @@ import numpy as np
 from anisomesh.errors import OptionError
 from anisomesh.mesh.surface import Surface
 from anisomesh.viz.camera import PictureOptions, framed, height_for
+from anisomesh.viz.colouring import Colouring
 from anisomesh.viz.draw import render
 from anisomesh.viz.page import PALE, Page, check_format
 from anisomesh.viz.renderer import require_renderer
@@ -21,16 +22,18 @@ _GALLERY_GAP = 8
 _GALLERY_PANEL_WIDTH = _GALLERY_COLUMN_WIDTH - 2 * _GALLERY_GAP
 _GALLERY_PANEL_HEIGHTS = (240, 520)  # smallest and largest
 _CAPTION_HEIGHT = 64
+_COLOUR_BAR_SPACE = 88
 _MAX_SINGLE_ROW = 4  # panels in one row by default
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Panel:
-    """A surface of a gallery, its name, and a note below the name."""
+    """A surface of a gallery, its name, a note below the name, and the colours of its faces (grey if None)."""
 
     surface: Surface
     name: str
     note: str
+    colouring: Colouring | None = None
 
 
 def gallery(
@@ -39,6 +42,7 @@ def gallery(
     *,
     columns: int | None = None,
     same_view: bool = False,
+    colour_bar: Colouring | None = None,
     options: PictureOptions | None = None,
 ) -> None:
     """Draw surfaces in a grid, row by row, into a PNG or PDF file.
@@ -53,6 +57,8 @@ def gallery(
         Surfaces per row; if None, up to four in one row, more in rows of three or four.
     same_view
         Use one camera for all surfaces, for versions of one shape; otherwise each surface fills its panel.
+    colour_bar
+        Colouring whose bar is drawn below the panels; give panels that it is for the same limits.
     options
         Camera and resolution; at scale 1 a column is 480 pixels wide.
 
@@ -78,16 +84,18 @@ def gallery(
     heights = [
         max(height_for(seen[k], axes[k], _GALLERY_PANEL_WIDTH, _GALLERY_PANEL_HEIGHTS) for k in row) for row in rows
     ]
-    page = Page(
-        _GALLERY_COLUMN_WIDTH * len(rows[0]), sum(heights) + len(rows) * (_GALLERY_GAP + _CAPTION_HEIGHT), scale
-    )
+    width, bottom = _GALLERY_COLUMN_WIDTH * len(rows[0]), sum(heights) + len(rows) * (_GALLERY_GAP + _CAPTION_HEIGHT)
+    page = Page(width, bottom + (0 if colour_bar is None else _COLOUR_BAR_SPACE), scale)
+    if colour_bar is not None:
+        page.colour_bar(colour_bar, (0.3 * width, bottom + 8, 0.4 * width, 14))
     top = 0
     for row, height in zip(rows, heights, strict=True):
         top += _GALLERY_GAP
         for column, k in enumerate(row):
             left = _GALLERY_COLUMN_WIDTH * column + _GALLERY_GAP
             view = framed(seen[k], axes[k], _GALLERY_PANEL_WIDTH / height)
-            pixels = render(panels[k].surface, view, (_GALLERY_PANEL_WIDTH * scale, height * scale), scale=scale)
+            size = (_GALLERY_PANEL_WIDTH * scale, height * scale)
+            pixels = render(panels[k].surface, view, size, colouring=panels[k].colouring, scale=scale)
             page.picture(pixels, (left, top, _GALLERY_PANEL_WIDTH, height))
             _caption(page, panels[k], left, top + height)
         top += height + _CAPTION_HEIGHT
