@@ -1,4 +1,4 @@
-"""Embeddings with precomputed extra coordinates, such as those of a network, and their metric."""
+"""Embeddings with precomputed extra coordinates, such as the output of a network, and their metric."""
 
 from __future__ import annotations
 

@@ -23,9 +23,9 @@ class BoundaryDistance:
     Attributes
     ----------
     mean_ab, mean_ba
-        Mean distance, by length, from the boundary of a to that of b, and from b to a.
+        Mean distance, by length, from the boundary of a to the boundary of b, and from b to a.
     max_ab, max_ba
-        Largest distance from the boundary of a to that of b, and from b to a (lower bounds of the one-sided Hausdorff
+        Largest distance from boundary a to boundary b, and from b to a (lower bounds of the one-sided Hausdorff
         distances).
     """
 

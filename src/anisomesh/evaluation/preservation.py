@@ -31,7 +31,7 @@ class FeaturePreservation:
     crease_covered
         Fraction of this length within the tolerance of a crease of the remesh; 1 if the reference has no creases.
     corners, corners_kept
-        Number of corners of the reference, and of those with a vertex of the remesh within the tolerance.
+        Number of corners of the reference, and of corners with a vertex of the remesh within the tolerance.
     """
 
     crease_length: float

@@ -29,7 +29,7 @@ class Evaluation:
     vertices, faces
         Size of the remesh.
     sampled, floor
-        The paper's measures between point samples of reference and remesh, and the same between two samples of the
+        The paper's measures between point samples of reference and remesh, and between two samples of the
         reference: no remesh can be expected to have better values.
     distance
         Distances from samples, vertices and edge midpoints of each surface to the other surface; a is the reference,

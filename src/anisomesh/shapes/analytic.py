@@ -79,7 +79,7 @@ def torus(major: float = 1.0, minor: float = 0.35, n_major: int = 72, n_minor: i
 def trefoil_knot(radius: float = 0.3, n_along: int = 300, n_around: int = 20) -> Surface:
     """Return a tube around a trefoil knot, about 6 wide; its sections are regular polygons on exact normal circles.
 
-    The curvature around the tube is large, the one along it small.
+    Curvature is large around the tube and small along it.
     """
     _check_minimum(3, n_along=n_along, n_around=n_around)
     t, v = _angles(n_along), _angles(n_around)[:, None]

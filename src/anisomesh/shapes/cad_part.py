@@ -162,7 +162,7 @@ def _square_around(loop: npt.NDArray[np.float64], block: int, n: int) -> patches
         square = 0.5 / np.abs(direction).max(axis=1, keepdims=True)
         between.append(direction * ((1 - t) * square + t * radius))
     points, faces = patches.patch_between_loops([outline - 0.5, *between, loop])
-    # The outline must be equal to those of adjacent patches in every bit.
+    # The coordinates of the outline must be bitwise equal to the adjacent patches.
     points[:, :2] += [block + 0.5, 0.5]
     points[: 4 * n, :2] = outline + np.array([block, 0.0])
     return points, faces

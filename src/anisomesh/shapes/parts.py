@@ -66,11 +66,11 @@ def loft(outline: Sequence[Sequence[float]] | Outline, profile: Sequence[Sequenc
         If the outline is not such a polygon, or the profile does not start and end on the axis or touches it in
         between.
     """
-    rim, rows = _checked(outline, profile)
+    polygon, rows = _validated(outline, profile)
     if rows[0, 0] != 0.0 or rows[-1, 0] != 0.0 or not (rows[1:-1, 0] > 0.0).all():
         raise OptionError("profile must start and end on the axis (radius 0) and have positive radii in between")
-    n_around = len(rim)
-    rings = _rings(rim, rows[1:-1])
+    n_around = len(polygon)
+    rings = _rings(polygon, rows[1:-1])
     ends = np.array([[0.0, 0.0, rows[0, 1]], [0.0, 0.0, rows[-1, 1]]])
     wall = patches.grid_faces(len(rings), n_around, wrap_columns=True)[:, ::-1] if len(rings) > 1 else np.zeros((0, 3))
     first, last = len(rings) * n_around, len(rings) * n_around + 1
@@ -98,31 +98,31 @@ def hollow_loft(outline: Sequence[Sequence[float]] | Outline, section: Sequence[
     OptionError
         If the outline is not such a polygon, or the section is clockwise or has a factor that is not positive.
     """
-    rim, rows = _checked(outline, section)
+    polygon, rows = _validated(outline, section)
     after = np.roll(rows, -1, axis=0)
     if not (rows[:, 0] > 0.0).all() or not (rows[:, 0] * after[:, 1] - rows[:, 1] * after[:, 0]).sum() > 0.0:
         raise OptionError("section must be counter-clockwise and have positive scale factors")
-    wall = patches.grid_faces(len(rows), len(rim), wrap_rows=True, wrap_columns=True)[:, ::-1]
-    return Surface(np.concatenate(_rings(rim, rows)), wall.astype(np.int64))
+    wall = patches.grid_faces(len(rows), len(polygon), wrap_rows=True, wrap_columns=True)[:, ::-1]
+    return Surface(np.concatenate(_rings(polygon, rows)), wall.astype(np.int64))
 
 
-def _checked(
+def _validated(
     outline: Sequence[Sequence[float]] | Outline, profile: Sequence[Sequence[float]] | Outline
 ) -> tuple[Outline, Outline]:
     """Return an outline (m, 2) and a profile (n, 2) as arrays, after validation."""
-    rim, rows = np.asarray(outline, dtype=np.float64), np.asarray(profile, dtype=np.float64)
-    if rim.ndim != 2 or rim.shape[1] != 2 or len(rim) < 3 or not is_star_shaped(rim):
+    polygon, rows = np.asarray(outline, dtype=np.float64), np.asarray(profile, dtype=np.float64)
+    if polygon.ndim != 2 or polygon.shape[1] != 2 or len(polygon) < 3 or not is_star_shaped(polygon):
         raise OptionError(
-            f"outline of shape {rim.shape}; expected (m, 2), counter-clockwise and star-shaped around the origin"
+            f"outline of shape {polygon.shape}; expected (m, 2), counter-clockwise and star-shaped around the origin"
         )
     if rows.ndim != 2 or rows.shape[1] != 2 or len(rows) < 3:
         raise OptionError(f"profile has shape {rows.shape}; expected (n, 2) with n of at least 3")
-    return rim, rows
+    return polygon, rows
 
 
-def _rings(rim: Outline, rows: Outline) -> list[Outline]:
+def _rings(polygon: Outline, rows: Outline) -> list[Outline]:
     """Return the sections (m, 3) of a loft, one for each row of the profile."""
-    return [np.pad(size * rim, ((0, 0), (0, 1)), constant_values=z) for size, z in rows]
+    return [np.pad(size * polygon, ((0, 0), (0, 1)), constant_values=z) for size, z in rows]
 
 
 def is_star_shaped(outline: Outline) -> bool:
