@@ -16,7 +16,6 @@ from collections import defaultdict
 from pathlib import Path
 
 import numpy as np
-from anisomesh.estimate import DESIGNED
 
 from anisomesh.features.detect import share_of_flat_edges
 from anisomesh.learn.data.items import Item, load_item
@@ -24,6 +23,7 @@ from anisomesh.learn.data.manifest import files_of
 from anisomesh.learn.inference.predict import predict
 from anisomesh.learn.inference.pretrained import pretrained_networks
 from anisomesh.mesh.geometry import sums_at_points
+from anisomesh.resolve import DESIGNED_SHARE
 from rotation import logarithm
 
 
@@ -46,7 +46,7 @@ def main() -> None:
     for path in paths:
         name, kind = path.stem.rsplit(".", 1)
         even = load_item(path.with_name(f"{name}.even.npz")).surface
-        designed = "designed" if share_of_flat_edges(even) >= DESIGNED else "other"
+        designed = "designed" if share_of_flat_edges(even) >= DESIGNED_SHARE else "other"
         groups[kind, designed].append(load_item(path))
     print(f"load {os.getloadavg()[0]:.2f}; {len(paths)} items")
     print(f"| mesh | shape | items | {' | '.join(Path(each).stem for each in asked.weights)} |")
