@@ -1,19 +1,23 @@
-"""Open surfaces: boundary curves, the arcs that cells cut them into, and a remesh whose boundary is the same curve."""
+"""Open surfaces: boundary loops, the intervals into which cells cut them, and remeshes that keep the boundary."""
 
 import igl
 import naive_rvd as naive
 import numpy as np
 import pytest
 
-from anisomesh.cvt.boundary import Boundary
-from anisomesh.cvt.features import Features
-from anisomesh.cvt.optimise import lloyd, minimise
-from anisomesh.features.boundary import boundary_curves
+from anisomesh.cvt.constraints import ConstrainedSites, spread_on_features
+from anisomesh.cvt.energy import NormalMetric
+from anisomesh.cvt.lbfgs import DescentOptions, minimise
+from anisomesh.cvt.lloyd import lloyd
+from anisomesh.features.boundary import trace_boundary
 from anisomesh.features.detect import sharp_edges
+from anisomesh.features.network import trace_features
 from anisomesh.mesh import topology
 from anisomesh.mesh.surface import Surface
 from anisomesh.pipeline import remesh
 from anisomesh.shapes.analytic import open_patch, sphere
+from anisomesh.voronoi.embedded_surface import EmbeddedSurface
+from anisomesh.voronoi.intervals import boundary_intervals
 from anisomesh.voronoi.restricted import RestrictedVoronoi
 
 
@@ -39,7 +43,7 @@ def square(n=16, width=1.0):
 
 
 def pierced():
-    """Return a square with a hole of one triangle far from the rim, and one of six."""
+    """Return a square with a hole of one triangle far from the outer boundary, and a hole of six triangles."""
     surface = square(20)
     centre = surface.points[surface.faces].mean(axis=1)
     gone = np.zeros(surface.n_faces, dtype=bool)
@@ -75,116 +79,117 @@ OPEN = {
 }
 
 
-def curves_of(surface):
-    return boundary_curves(surface.points, surface)
+def loops_of(surface):
+    return trace_boundary(surface.points, surface)
 
 
 def distance_to_boundary(points, surface):
-    rim = surface.edges[surface.edge_face_count == 1].astype(np.int64)
+    boundary = surface.edges[surface.edge_face_count == 1].astype(np.int64)
     tree = igl.AABB()
-    tree.init(surface.points, rim)
-    return np.sqrt(tree.squared_distance(surface.points, rim, np.ascontiguousarray(points))[0])
+    tree.init(surface.points, boundary)
+    return np.sqrt(tree.squared_distance(surface.points, boundary, np.ascontiguousarray(points))[0])
 
 
 @pytest.mark.parametrize("name", OPEN)
-def test_curves_are_the_loops_of_the_boundary(name):
+def test_polylines_are_the_boundary_loops(name):
     surface = OPEN[name][0]()
-    curves = curves_of(surface)
-    loops = topology.boundary_loops(surface.faces)
-    assert curves.n_curves == len(loops)
-    mine = {frozenset(curves.point[a:b].tolist()) for a, b in zip(curves.first[:-1], curves.first[1:], strict=True)}
-    assert mine == {frozenset(loop.tolist()) for loop in loops}
-    assert curves.start[-1] == pytest.approx(surface.edge_lengths[surface.edge_face_count == 1].sum())
+    loops, wanted = loops_of(surface), topology.boundary_loops(surface.faces)
+    assert loops.n_polylines == len(wanted)
+    found = {frozenset(loops.tail[a:b].tolist()) for a, b in zip(loops.first[:-1], loops.first[1:], strict=True)}
+    assert found == {frozenset(loop.tolist()) for loop in wanted}
+    assert loops.start[-1] == pytest.approx(surface.edge_lengths[surface.edge_face_count == 1].sum())
 
 
-def test_places_on_a_curve_go_around_it():
-    curves = curves_of(square(4))
+def test_arc_lengths_wrap_around_a_loop():
+    loops = loops_of(square(4))
     zero = np.zeros(3, dtype=np.int64)
-    corner = curves.at(np.array([0.0, 4.0, -8.0]), zero)
+    corner = loops.at(np.array([0.0, 4.0, -8.0]), zero)
     np.testing.assert_allclose(corner, np.tile(corner[0], (3, 1)), atol=1e-12)
     places = np.linspace(0.0, 4.0, 37)
-    points = curves.at(places, np.zeros(37, dtype=np.int64))
+    points = loops.at(places, np.zeros(37, dtype=np.int64))
     assert np.linalg.norm(np.diff(points, axis=0), axis=1).sum() == pytest.approx(4.0, abs=1e-9)
     assert np.allclose(distance_to_boundary(points, square(4)), 0.0, atol=1e-12)
 
 
-def test_corners_are_where_the_curve_turns_and_not_at_small_teeth():
+def test_corners_are_where_the_boundary_turns_and_not_at_small_notches():
     surface = square(16)
-    curves = curves_of(surface)
-    sides, turn = curves.corners(0.2, np.zeros(0, dtype=np.int64))
-    at = surface.points[curves.point[sides]]
+    loops = loops_of(surface)
+    segments, turn = loops.corners(0.2, np.zeros(0, dtype=np.int64))
+    at = surface.points[loops.tail[segments]]
     assert {tuple(np.round(point[:2]).astype(int)) for point in at} == {(0, 0), (0, 1), (1, 0), (1, 1)}
     np.testing.assert_allclose(np.abs(at - np.round(at)), 0.0, atol=1e-12)
     np.testing.assert_allclose(turn, 90.0)
-    tooth = np.array(surface.points)
-    lower = np.flatnonzero((tooth[:, 1] == 0.0) & (tooth[:, 0] > 0.05) & (tooth[:, 0] < 0.95))
-    tooth[lower[::2], 1] = 0.04
-    rough = curves_of(Surface(tooth, surface.faces))
-    sides = rough.corners(0.2, np.zeros(0, dtype=np.int64))[0]
-    assert np.abs(tooth[rough.point[sides], 0] - 0.5).min() > 0.3  # none at the teeth but next to true corners
+    notched = np.array(surface.points)
+    lower = np.flatnonzero((notched[:, 1] == 0.0) & (notched[:, 0] > 0.05) & (notched[:, 0] < 0.95))
+    notched[lower[::2], 1] = 0.04
+    rough = loops_of(Surface(notched, surface.faces))
+    segments = rough.corners(0.2, np.zeros(0, dtype=np.int64))[0]
+    assert np.abs(notched[rough.tail[segments], 0] - 0.5).min() > 0.3  # none at notches, except near true corners
     assert len(rough.corners(0.03, np.zeros(0, dtype=np.int64))[0]) > 12
-    smooth = curves_of(band())
+    smooth = loops_of(band())
     assert len(smooth.corners(0.3, np.zeros(0, dtype=np.int64))[0]) == 0
-    assert smooth.point[smooth.corners(0.3, smooth.point[[7]])[0]].tolist() == [smooth.point[7]]
+    assert smooth.tail[smooth.corners(0.3, smooth.tail[[7]])[0]].tolist() == [smooth.tail[7]]
 
 
 @pytest.mark.parametrize("n_sites", [1, 2, 7, 60])
 @pytest.mark.parametrize("name", OPEN)
-def test_arcs_divide_the_boundary_among_the_nearest_sites(name, n_sites):
+def test_intervals_divide_the_boundary_among_the_nearest_sites(name, n_sites):
     surface = OPEN[name][0]()
-    voronoi = RestrictedVoronoi(surface.points, surface.faces)
+    embedded = EmbeddedSurface.in_space(surface)
     sites = naive.random_sites(surface.points, surface.faces, n_sites, np.random.default_rng(n_sites))
-    ordered = Surface(surface.points, voronoi.faces)
-    boundary = Boundary(voronoi, ordered, n_sites, sharp_edges(ordered, 45.0))
-    arcs = boundary.arcs(voronoi.diagram(sites))
-    total = np.bincount(arcs.curve, arcs.length, minlength=boundary.curves.n_curves)
-    low, high = boundary.curves.limits.T
+    sharp = sharp_edges(embedded.surface, 45.0)
+    features = trace_features(embedded.points, embedded.surface, n_sites, embedded.site_spacing(n_sites), sharp=sharp)
+    loops = features.boundary
+    intervals = boundary_intervals(features, RestrictedVoronoi(embedded).diagram(sites))
+    total = np.bincount(intervals.polyline, intervals.length, minlength=loops.n_polylines)
+    low, high = loops.limits.T
     np.testing.assert_allclose(total, high - low, rtol=1e-9)
     for share in (0.02, 0.3, 0.5, 0.98):
-        points = boundary.curves.at(arcs.start + share * arcs.length, arcs.curve)
+        points = loops.at(intervals.start + share * intervals.length, intervals.polyline)
         distance = np.linalg.norm(points[:, None] - sites[None], axis=2)
-        own = distance[np.arange(len(points)), arcs.site]
+        own = distance[np.arange(len(points)), intervals.site]
         np.testing.assert_array_less(own, distance.min(axis=1) + 1e-9)
-    cornered = np.flatnonzero(arcs.corner >= 0)
-    corner = surface.points[boundary.curves.point[boundary.corners]]
-    np.testing.assert_array_equal(arcs.place[cornered], corner[arcs.corner[cornered]])
+    cornered = np.flatnonzero(intervals.corner >= 0)
+    corner = surface.points[loops.tail[features.boundary_corners]]
+    np.testing.assert_array_equal(intervals.place[cornered], corner[intervals.corner[cornered]])
     owner = np.linalg.norm(corner[:, None] - sites[None], axis=2).argmin(axis=1)
-    assert set(arcs.site[cornered]) == set(owner)
-    assert {tuple(point) for point in arcs.second} <= {tuple(point) for point in corner}
-    assert len(cornered) + len(arcs.second) >= len(corner)
-    middle = boundary.curves.at(arcs.start + 0.5 * arcs.length, arcs.curve)
-    np.testing.assert_allclose(arcs.place[arcs.corner < 0], middle[arcs.corner < 0], atol=1e-12)
+    assert set(intervals.site[cornered]) == set(owner)
+    assert {tuple(point) for point in intervals.crowded_corners} <= {tuple(point) for point in corner}
+    assert len(cornered) + len(intervals.crowded_corners) >= len(corner)
+    middle = loops.at(intervals.start + 0.5 * intervals.length, intervals.polyline)
+    np.testing.assert_allclose(intervals.place[intervals.corner < 0], middle[intervals.corner < 0], atol=1e-12)
 
 
 def test_fixed_sites_stay_and_the_others_descend():
     surface = halved_sphere()
-    voronoi = RestrictedVoronoi(surface.points, surface.faces)
+    voronoi = RestrictedVoronoi(EmbeddedSurface.in_space(surface))
     sites = naive.random_sites(surface.points, surface.faces, 40, np.random.default_rng(0))
     fixed = np.arange(40) % 3 == 0
     for sharpness in (1.0, 7.0):
-        moved = minimise(voronoi, sites, sharpness=sharpness, max_iterations=5, fixed=fixed)
+        energy = NormalMetric(sharpness)
+        moved = minimise(voronoi, sites, energy, options=DescentOptions(max_iterations=5), fixed=fixed)
         np.testing.assert_array_equal(moved.sites[fixed], sites[fixed])
         assert np.all(np.linalg.norm(moved.sites - sites, axis=1)[~fixed] > 0.0)
-        assert moved.energy < voronoi.evaluate(sites, sharpness).energy
+        assert moved.energy < voronoi.integrate(sites, sharpness).value
     np.testing.assert_array_equal(lloyd(voronoi, sites, 2, fixed=fixed)[fixed], sites[fixed])
 
 
-def test_drawn_sites_are_on_the_boundary_one_for_each_long_arc():
+def test_spread_sites_are_on_the_boundary_one_for_each_long_interval():
     surface = square(24)
-    voronoi = RestrictedVoronoi(surface.points, surface.faces)
+    embedded = EmbeddedSurface.in_space(surface)
+    voronoi = RestrictedVoronoi(embedded)
     sites = naive.random_sites(surface.points, surface.faces, 100, np.random.default_rng(0))
-    ordered = Surface(surface.points, voronoi.faces)
-    none = np.zeros(len(ordered.edges), dtype=bool)
-    features = Features(voronoi, ordered, 100, none, none)
-    nowhere = np.zeros(100, dtype=bool)
-    drawn, there, on_crease = features.spread(voronoi, lloyd(voronoi, sites, 5), nowhere, nowhere)
-    assert not on_crease.any()
-    assert np.all(distance_to_boundary(drawn[there], surface) < 1e-12)
-    assert np.all(distance_to_boundary(drawn[~there], surface) > 0.02)
+    none = np.zeros(len(embedded.surface.edges), dtype=bool)
+    features = trace_features(embedded.points, embedded.surface, 100, embedded.site_spacing(100), sharp=none)
+    spread = spread_on_features(features, voronoi, ConstrainedSites.free(lloyd(voronoi, sites, 5)))
+    positions, on_boundary = spread.positions, spread.on_boundary
+    assert not spread.on_crease.any()
+    assert np.all(distance_to_boundary(positions[on_boundary], surface) < 1e-12)
+    assert np.all(distance_to_boundary(positions[~on_boundary], surface) > 0.02)
     corners = np.array([[x, y, 0.0] for x in (0.0, 1.0) for y in (0.0, 1.0)])
-    assert np.linalg.norm(drawn[:, None] - corners[None], axis=2).min(axis=0).max() < 1e-12
-    # four sides of 1 at the distance of a hexagonal lattice of 100 sites
-    assert there.sum() == pytest.approx(4.0 / features.boundary.spacing, rel=0.2)
+    assert np.linalg.norm(positions[:, None] - corners[None], axis=2).min(axis=0).max() < 1e-12
+    # four sides of length 1 at the spacing of a hexagonal lattice of 100 sites
+    assert on_boundary.sum() == pytest.approx(4.0 / features.spacing, rel=0.2)
 
 
 @pytest.mark.parametrize("sharpness", [1.0, 7.0])
