@@ -45,7 +45,7 @@ def test_closest_points_on_flat_facets_are_found_along_the_longest_side():
 
 
 def test_a_triangle_on_two_sheets_that_lie_on_each_other_faces_one_of_them():
-    """Regression: the facet found as closest was either, so half of the triangles of a good remesh were turned."""
+    """Regression: the facet found as closest was either, so half of the triangles of a good remesh were inverted."""
     lower = box(n=2)
     up = np.array([0.0, 0.0, 1.0])
     upper = lower.points + up
@@ -63,7 +63,7 @@ def test_a_triangle_on_two_sheets_that_lie_on_each_other_faces_one_of_them():
 
 
 @pytest.mark.parametrize("seed", range(8))
-def test_no_triangle_is_turned_against_a_fold_or_at_a_right_angle(seed):
+def test_no_triangle_is_inverted_against_a_fold_or_at_a_right_angle(seed):
     """Regression: the sum of opposite normals is rounding, and so is the product of normals at a right angle."""
     turn = np.linalg.qr(np.random.default_rng(seed).normal(size=(3, 3)))[0]
     fold = np.array([[0.0, 0, 0], [1, 0, 0], [0.3, 1, 0], [0.6, 1, 0]]) @ turn

@@ -92,24 +92,20 @@ class _NumberStream:
 
 
 def _check_node_blocks(numbers: _NumberStream, n_bytes: int) -> None:
-    left = int(numbers.take(4, "<u8")[0])
-    while left > 0:
+    for _ in range(int(numbers.take(4, "<u8")[0])):
         numbers.take(3, "<i4")
         count = int(numbers.take(1, "<u8")[0])
         _check_tags(numbers.take(count, "<u8"), n_bytes)
         numbers.take(3 * count, "<f8")
-        left -= 1
 
 
 def _check_element_blocks(numbers: _NumberStream) -> None:
-    left = int(numbers.take(4, "<u8")[0])
-    while left > 0:
+    for _ in range(int(numbers.take(4, "<u8")[0])):
         kind = int(numbers.take(3, "<i4")[2])
         count = int(numbers.take(1, "<u8")[0])
         if kind not in _NODES_OF_TYPE:
             return  # a higher-order type of unknown size: the next block cannot be found
         numbers.take(count * (1 + _NODES_OF_TYPE[kind]), "<u8")
-        left -= 1
 
 
 def _check_tags(tags: npt.NDArray[Any], n_bytes: int) -> None:

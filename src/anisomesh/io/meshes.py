@@ -62,13 +62,11 @@ def load(path: str | os.PathLike[str]) -> Surface:
     ignored. STL stores unconnected triangles; corners with equal coordinates are welded, which is logged.
     """
     path = Path(path)
-    suffix = path.suffix.lower()
     if path.is_dir():
         raise MeshFileError(f"{path}: is a folder; expected a mesh file")
     if not path.exists():
         raise MeshFileError(f"{path}: no such file; expected a mesh file")
-    if suffix not in MESH_FORMATS:
-        raise MeshFileError(_unknown_format(path))
+    suffix = _known_suffix(path)
     try:
         data = path.read_bytes()
     except OSError as error:
@@ -112,9 +110,7 @@ def save(surface: Surface, path: str | os.PathLike[str], *, point_data: PointDat
     OBJ, OFF, PLY, VTU, MSH and MEDIT keep every float64 exactly; STL and GLB round to float32.
     """
     path = Path(path)
-    suffix = path.suffix.lower()
-    if suffix not in MESH_FORMATS:
-        raise MeshFileError(_unknown_format(path))
+    suffix = _known_suffix(path)
     data = {name: np.asarray(values) for name, values in (point_data or {}).items()}
     for name, values in data.items():
         if len(values) != surface.n_points:
@@ -152,6 +148,9 @@ def _write(surface: Surface, path: Path, data: dict[str, npt.NDArray[Any]]) -> N
             third_party_formats.write_msh(path, points, faces)
 
 
-def _unknown_format(path: Path) -> str:
-    expected = ", ".join(sorted(MESH_FORMATS))
-    return f"{path}: unknown format {path.suffix or '(no extension)'}; expected one of {expected}"
+def _known_suffix(path: Path) -> str:
+    """Return the extension in lower case, or raise MeshFileError if the format is unknown."""
+    if path.suffix.lower() not in MESH_FORMATS:
+        expected = ", ".join(sorted(MESH_FORMATS))
+        raise MeshFileError(f"{path}: unknown format {path.suffix or '(no extension)'}; expected one of {expected}")
+    return path.suffix.lower()

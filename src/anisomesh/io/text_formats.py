@@ -105,26 +105,22 @@ def read_medit(data: bytes) -> PolygonSoup:
 
 def obj_text(points: Points, faces: Faces) -> str:
     """Return the content of an OBJ file."""
-    return _format_rows("v %r %r %r\n", points) + _format_rows("f %d %d %d\n", faces + 1)
+    return _lines("v %r %r %r\n", points) + _lines("f %d %d %d\n", faces + 1)
 
 
 def off_text(points: Points, faces: Faces) -> str:
     """Return the content of an OFF file."""
-    return (
-        f"OFF\n{len(points)} {len(faces)} 0\n"
-        + _format_rows("%r %r %r\n", points)
-        + _format_rows("3 %d %d %d\n", faces)
-    )
+    return f"OFF\n{len(points)} {len(faces)} 0\n" + _lines("%r %r %r\n", points) + _lines("3 %d %d %d\n", faces)
 
 
 def medit_text(points: Points, faces: Faces) -> str:
     """Return the content of a MEDIT .mesh text file, version 2 (float64)."""
-    vertices = f"Vertices\n{len(points)}\n" + _format_rows("%r %r %r 0\n", points)
-    triangles = f"Triangles\n{len(faces)}\n" + _format_rows("%d %d %d 0\n", faces + 1)
+    vertices = f"Vertices\n{len(points)}\n" + _lines("%r %r %r 0\n", points)
+    triangles = f"Triangles\n{len(faces)}\n" + _lines("%d %d %d 0\n", faces + 1)
     return f"MeshVersionFormatted 2\nDimension 3\n{vertices}{triangles}End\n"
 
 
-def _format_rows(pattern: str, table: npt.NDArray[np.float64] | npt.NDArray[np.int32]) -> str:
+def _lines(pattern: str, table: npt.NDArray[np.float64] | npt.NDArray[np.int32]) -> str:
     return (pattern * len(table)) % tuple(table.ravel().tolist())
 
 

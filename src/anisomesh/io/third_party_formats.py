@@ -5,11 +5,11 @@ Readers raise ValueError with an explanation where a file is wrong; what the lib
 
 from __future__ import annotations
 
-import contextlib
 import io
 import logging
 import warnings
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Mapping
+from contextlib import redirect_stderr, redirect_stdout
 from pathlib import Path
 from typing import Any
 
@@ -105,23 +105,13 @@ def _surface_cells(mesh: Any) -> PolygonSoup:
 
 def _quietly(call: Callable[[], Any]) -> Any:
     """Call a library function, log what it prints, and turn SystemExit into ValueError."""
-    with _captured_output() as output:
-        try:
-            return call()
-        except SystemExit as error:
-            raise ValueError(" ".join(output.getvalue().split()) or "the library cannot read the file") from error
-
-
-@contextlib.contextmanager
-def _captured_output() -> Iterator[io.StringIO]:
     output = io.StringIO()
-    with (
-        contextlib.redirect_stdout(output),
-        contextlib.redirect_stderr(output),
-        warnings.catch_warnings(),
-        np.errstate(all="ignore"),
-    ):
-        warnings.simplefilter("ignore")
-        yield output
-    if output.getvalue():
-        logger.debug("%s", output.getvalue())
+    try:
+        with redirect_stdout(output), redirect_stderr(output), warnings.catch_warnings(), np.errstate(all="ignore"):
+            warnings.simplefilter("ignore")
+            return call()
+    except SystemExit as error:
+        raise ValueError(" ".join(output.getvalue().split()) or "the library cannot read the file") from error
+    finally:
+        if output.getvalue():
+            logger.debug("%s", output.getvalue())

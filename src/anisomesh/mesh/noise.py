@@ -34,9 +34,8 @@ def with_noise(surface: Surface, noise: float, rng: np.random.Generator, kind: N
     if kind == "normal":
         offsets = offsets[:, :1] * surface.point_normals
     elif kind == "smooth":
-        size = len(offsets)
         ends = np.concatenate([surface.edges, surface.edges[:, ::-1]])
-        sums = np.stack([np.bincount(ends[:, 0], offsets[ends[:, 1], axis], size) for axis in range(3)], axis=1)
-        count = np.bincount(ends[:, 0], minlength=size)[:, None]
+        sums = np.stack([np.bincount(ends[:, 0], offsets[ends[:, 1], k], len(offsets)) for k in range(3)], axis=1)
+        count = np.bincount(ends[:, 0], minlength=len(offsets))[:, None]
         offsets = (offsets + sums) / (2.0 * np.sqrt(count + 1.0))
     return surface.with_points(surface.points + offsets)
