@@ -34,5 +34,5 @@ def test_topology_holds_and_what_is_left_is_said(make, seed, size):
     assert np.isfinite(new.points).all()
     said = " ".join(result.warnings)
     assert new.n_points >= n or "instead of" in said or new.n_points > 0.98 * n
-    assert not result.validity.inverted or "turned" in said
+    assert not result.validity.inverted or "inverted" in said
     assert not result.validity.new_intersections or "intersect" in said
