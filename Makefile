@@ -1,19 +1,26 @@
-# make demo   install into .venv and remesh a sample; results in demo/
-# make test   install what the tests need as well and run every test
-# make docs   build the documentation into site/ and report broken links
-# make check  the tests and all linters, as in continuous integration
+# make demo       install into .venv and remesh a sample; results in demo/
+# make test       install what the tests need as well and run every test
+# make test-fast  run only the quick tests, with fewer random examples
+# make docs       build the documentation into site/ and report broken links
+# make check      the tests and all linters, as in continuous integration
 
 PYTHON ?= python3
 VENV := .venv
 BIN := $(VENV)/bin
+# The tests share one process per core: make test WORKERS=4
+WORKERS ?= auto
+PYTEST := $(BIN)/python -m pytest --numprocesses $(WORKERS) --dist worksteal
 
-.PHONY: demo docs test install check clean
+.PHONY: demo docs test test-fast install check clean
 
 demo: $(VENV)/.installed-picture
 	$(BIN)/anisomesh demo --out demo
 
 test: install
-	$(BIN)/python -m pytest
+	HYPOTHESIS_PROFILE=ci $(PYTEST)
+
+test-fast: install
+	$(PYTEST) -m "not slow"
 
 install: $(VENV)/.installed-test
 

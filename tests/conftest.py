@@ -3,6 +3,7 @@
 import contextlib
 import io
 import os
+import subprocess
 import sys
 import warnings
 from collections.abc import Callable, Iterator
@@ -46,6 +47,17 @@ def run_cli() -> Callable[..., CompletedProcess[str]]:
         ):
             code = main(arguments)
         return CompletedProcess(arguments, code, out.getvalue(), err.getvalue())
+
+    return run
+
+
+@pytest.fixture(scope="session")
+def run_process() -> Callable[..., CompletedProcess[str]]:
+    """Run ``anisomesh`` with the given arguments in a new process and return the finished process."""
+
+    def run(*words: object, cwd: Path | None = None) -> CompletedProcess[str]:
+        command = [*CLI, *map(str, words)]
+        return subprocess.run(command, cwd=cwd, capture_output=True, text=True, timeout=300, check=False)
 
     return run
 

@@ -1,4 +1,4 @@
-"""``anisomesh evaluate``: text, JSON and errors, as another process."""
+"""``anisomesh evaluate``: text, JSON and errors."""
 
 import json
 

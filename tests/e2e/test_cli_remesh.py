@@ -1,4 +1,4 @@
-"""``anisomesh remesh`` from outside: files, report, standard output, reproducibility."""
+"""``anisomesh remesh``: files, report, standard output, reproducibility."""
 
 import json
 from pathlib import Path
@@ -26,10 +26,10 @@ def read(path):
 
 
 @pytest.fixture(scope="module")
-def run_with_everything(run_cli, torus_obj, tmp_path_factory):
-    """One run that writes every kind of output; the folder and the finished process."""
+def run_with_everything(run_process, torus_obj, tmp_path_factory):
+    """A process that writes every kind of output; its folder and the finished process."""
     folder = tmp_path_factory.mktemp("everything")
-    process = run_cli(
+    process = run_process(
         *("remesh", torus_obj, "-o", folder / "out.ply", "-n", 300, "--json"),
         *("--report", folder / "report.json", "--rvd", folder / "rvd.vtu", "--picture", folder / "both.png"),
     )
