@@ -4,56 +4,63 @@ import numpy as np
 import pytest
 from creases import wedge
 
-from anisomesh.cvt.relocation import exchange_sites
+from anisomesh.cvt.constraints import ConstrainedSites
+from anisomesh.cvt.energy import NormalMetric
+from anisomesh.cvt.relocation import relocate_to_missed_points
 from anisomesh.delaunay.delta_complex import simplicial_mesh
-from anisomesh.delaunay.dual import dual_mesh
-from anisomesh.delaunay.placement import cells_with_crease, crease_positions, on_main_planes, snap_to_missed
+from anisomesh.delaunay.dual import dual_mesh, dual_squared_errors
+from anisomesh.delaunay.placement import (
+    cells_with_crease,
+    plane_intersections,
+    project_to_main_planes,
+    snap_to_missed_corners,
+)
 from anisomesh.features.detect import corners, sharp_edges
 from anisomesh.mesh.closest_points import ClosestPoints
 from anisomesh.mesh.surface import Surface
 from anisomesh.shapes.analytic import box
-from anisomesh.voronoi.cells import cells_of
+from anisomesh.voronoi.cells import cell_complex
+from anisomesh.voronoi.embedded_surface import EmbeddedSurface
 from anisomesh.voronoi.restricted import RestrictedVoronoi
 
 
-def _box_dual(n_sites, seed=0):
+def cells_of_sites(surface, sites):
+    return cell_complex(RestrictedVoronoi(EmbeddedSurface.in_space(surface), threads=1).diagram(sites))
+
+
+def box_cells(n_sites, seed=0):
     surface = box(n=12)
-    voronoi = RestrictedVoronoi(surface.points, surface.faces, threads=1)
-    ordered = Surface(surface.points, voronoi.faces)
     rng = np.random.default_rng(seed)
     sites = surface.points[rng.choice(surface.n_points, n_sites, replace=False)] * 0.98 + 0.01
-    diagram = voronoi.diagram(sites)
-    return ordered, voronoi, diagram, cells_of(diagram, ordered.face_neighbours, voronoi.facets.area)
+    return cells_of_sites(surface, sites)
 
 
 def test_a_sliver_beyond_a_crease_does_not_lift_the_vertex_off_its_plane():
-    """Regression: between two planes at 120 degrees a vertex was off the one that nearly all of its cell lies in."""
+    """Regression: between two planes at 120 degrees a vertex was off the plane with nearly all of its cell."""
     roof = wedge(np.radians(120.0))
     left, right = (np.array([side * np.sin(np.pi / 3.0), 0.0, -0.5]) for side in (-1.0, 1.0))
-    voronoi = RestrictedVoronoi(roof.points, roof.faces, threads=1)
-    surface = Surface(roof.points, voronoi.faces)
-    diagram = voronoi.diagram(np.stack([0.4 * left, 0.4002 * right]))
-    cells = cells_of(diagram, surface.face_neighbours, voronoi.facets.area)
-    chosen = cells_with_crease(diagram, cells, surface, sharp_edges(surface, 40.0))
+    cells = cells_of_sites(roof, np.stack([0.4 * left, 0.4002 * right]))
+    chosen = cells_with_crease(cells, sharp_edges(cells.embedded.surface, 40.0))
     assert cells.site[chosen].tolist() == [0]  # the other has nothing of the crest
-    lifted = crease_positions(voronoi, diagram, cells, 1.0, chosen)
-    placed = on_main_planes(diagram, cells, surface, chosen, lifted)
+    lifted = plane_intersections(cells, chosen)
+    placed = project_to_main_planes(cells, chosen, lifted)
     normal = np.cross(left, [0.0, 1.0, 0.0])
     assert abs(lifted[0] @ normal) > 1e-9
     assert abs(placed[0] @ normal) < 1e-15
     assert np.linalg.norm(placed - lifted) < 1e-4
 
 
-def test_vertices_of_creased_cells_go_to_where_their_planes_meet():
-    surface, voronoi, diagram, cells = _box_dual(120)
-    chosen = cells_with_crease(diagram, cells, surface, sharp_edges(surface, 45.0))
-    places = crease_positions(voronoi, diagram, cells, 1.0, chosen)
-    normals = np.abs(voronoi.facets.normal[diagram.facet]).round().astype(bool)
-    axes = np.zeros((len(cells.site), 3), dtype=bool)
+def test_vertices_of_cells_with_a_crease_go_to_where_their_planes_meet():
+    cells = box_cells(120)
+    diagram, embedded = cells.diagram, cells.embedded
+    chosen = cells_with_crease(cells, sharp_edges(embedded.surface, 45.0))
+    places = plane_intersections(cells, chosen)
+    normals = np.abs(embedded.facets.normal[diagram.facet]).round().astype(bool)
+    axes = np.zeros((cells.n_components, 3), dtype=bool)
     np.logical_or.at(axes, cells.of_polygon, normals)
     assert chosen.tolist() == np.flatnonzero(axes.sum(axis=1) > 1).tolist()
-    assert len(chosen) < len(cells.site)
-    shares = diagram.fractions * voronoi.facets.area[diagram.facet]
+    assert len(chosen) < cells.n_components
+    shares = diagram.fractions * embedded.face_areas[diagram.facet]
     for component, place in zip(chosen, places, strict=True):
         mine = cells.of_polygon == component
         for axis in np.flatnonzero(axes[component]):
@@ -65,10 +72,10 @@ def test_vertices_of_creased_cells_go_to_where_their_planes_meet():
 
 @pytest.mark.parametrize("angle", [91.0, 180.0])
 def test_no_edge_of_a_box_is_sharper_than_a_right_angle(angle):
-    surface, _, diagram, cells = _box_dual(30)
-    sharp = sharp_edges(surface, angle)
+    cells = box_cells(30)
+    sharp = sharp_edges(cells.embedded.surface, angle)
     assert not sharp.any()
-    assert len(cells_with_crease(diagram, cells, surface, sharp)) == 0
+    assert len(cells_with_crease(cells, sharp)) == 0
 
 
 def test_corners_of_a_box_are_its_corners():
@@ -78,30 +85,31 @@ def test_corners_of_a_box_are_its_corners():
     np.testing.assert_array_equal(np.abs(found - 0.5), 0.5)
 
 
-def test_missed_corners_are_met_after_snapping():
-    surface, _, diagram, cells = _box_dual(200, seed=3)
-    points, faces, done = simplicial_mesh(dual_mesh(diagram, cells, surface))
+def test_snapping_moves_vertices_onto_missed_corners():
+    cells = box_cells(200, seed=3)
+    surface = cells.embedded.surface
+    points, faces, done = simplicial_mesh(dual_mesh(cells))
     assert done
     sharp = sharp_edges(surface, 45.0)
     ends = surface.points[corners(surface, sharp)]
     before = np.sqrt(ClosestPoints(Surface(points, faces)).squared_distances(ends))
-    snapped = snap_to_missed(diagram, cells, surface, points, faces, sharp, np.ones(len(cells.site), dtype=bool))
+    snapped = snap_to_missed_corners(cells, points, faces, sharp, np.ones(cells.n_components, dtype=bool))
     after = np.sqrt(ClosestPoints(Surface(snapped, faces)).squared_distances(ends))
     assert before.max() > 0.01
     assert (after < 1e-9).sum() > (before < 1e-9).sum()
-    unmoved = np.setdiff1d(np.arange(len(points)), cells_with_crease(diagram, cells, surface, sharp))
+    unmoved = np.setdiff1d(np.arange(len(points)), cells_with_crease(cells, sharp))
     np.testing.assert_array_equal(snapped[unmoved], points[unmoved])
     total = [ClosestPoints(Surface(p, faces)).squared_distances(surface.points).sum() for p in (points, snapped)]
     assert total[1] < total[0]
 
 
-def test_exchange_puts_a_site_on_a_missed_corner():
+def test_relocation_puts_a_site_on_a_missed_corner():
     surface = box(n=12)
-    voronoi = RestrictedVoronoi(surface.points, surface.faces, threads=1)
-    ordered = Surface(surface.points, voronoi.faces)
+    voronoi = RestrictedVoronoi(EmbeddedSurface.in_space(surface), threads=1)
     corner = np.ones(3)
     sites = surface.points[np.linalg.norm(surface.points - corner, axis=1) > 0.25][::2]
-    changed = exchange_sites(voronoi, sites, ordered, 1.0, 7.0)
+    errors = dual_squared_errors(voronoi.diagram(sites))
+    changed = relocate_to_missed_points(voronoi, ConstrainedSites.free(sites), NormalMetric(7.0), errors).positions
     assert changed.shape == sites.shape
     assert np.linalg.norm(sites - corner, axis=1).min() > 0.25
     assert np.linalg.norm(changed - corner, axis=1).min() == 0.0
