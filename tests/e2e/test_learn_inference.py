@@ -126,7 +126,7 @@ def test_the_embedding_that_is_left_open_is_hybrid_for_the_curvature_metric(egg)
     tensors = np.tile(np.eye(3), (egg.n_points, 1, 1))
     for metric, wanted in (("curvature", "hybrid"), ("approximation", "direct"), (tensors, "direct")):
         result = anisomesh.remesh(egg, n_vertices=100, metric=metric, max_iterations=3)
-        assert result.embedded == wanted
+        assert result.embedding_name == wanted
         assert result.report()["embedding"] == wanted
 
 

@@ -177,7 +177,7 @@ def test_options_out_of_range_are_refused(ring, options, words):
 
 
 def test_a_metric_of_the_wrong_shape_or_sign_is_refused(ring):
-    with pytest.raises(MetricError, match="one tensor per point"):
+    with pytest.raises(MetricError, match="one value for each point"):
         anisomesh.remesh(ring, n_vertices=100, metric=np.eye(3)[None])
     with pytest.raises(MetricError, match="positive definite"):
         anisomesh.remesh(ring, n_vertices=100, metric=np.broadcast_to(-np.eye(3), (ring.n_points, 3, 3)))

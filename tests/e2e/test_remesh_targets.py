@@ -7,7 +7,7 @@ import pytest
 from edge_distance import distance_to_edges
 
 import anisomesh
-from anisomesh.deadline import Clock
+from anisomesh.deadline import Deadline
 from anisomesh.errors import AnisomeshError, OptionError, TimeLimitError
 from anisomesh.features.detect import points_along
 from anisomesh.mesh import topology
@@ -180,13 +180,13 @@ def test_a_time_limit_ends_the_search_with_the_best_result_so_far():
             raise TimeLimitError("over")
         return anisomesh.remesh(surface, n_vertices=n, max_iterations=5)
 
-    result = smallest_within(run, surface, 0.2, Clock())
+    result = smallest_within(run, surface, 0.2, Deadline())
     assert result.surface.n_points == min(tried[:2])
     assert result.distance <= 0.2
     assert "the time limit ended the search" in result.warnings[-1]
     tried[:] = [0, 0]
     with pytest.raises(TimeLimitError):
-        smallest_within(run, surface, 0.2, Clock())
+        smallest_within(run, surface, 0.2, Deadline())
 
 
 def test_one_of_the_ways_to_ask_is_wanted():

@@ -1,9 +1,9 @@
-"""The search for the smallest count, on errors given by formulas, with and without noise."""
+"""The search for the smallest count, with errors from formulas, with and without noise."""
 
 import numpy as np
 import pytest
 
-from anisomesh.search import CLOSE, smallest_count
+from anisomesh.search import COUNT_PRECISION, smallest_count
 
 
 def counted(function):
@@ -23,12 +23,12 @@ def test_the_smallest_count_is_found_to_three_per_cent(power, answer, first):
     error_at, tried = counted(lambda n: (answer / n) ** power)
     n, error = smallest_count(error_at, 1.0, first, 4, 100_000)
     assert error == error_at(n) <= 1.0
-    assert answer <= n <= max(answer + 1, CLOSE * answer)
+    assert answer <= n <= max(answer + 1, COUNT_PRECISION * answer)
     assert len(tried) <= 17
 
 
 @pytest.mark.parametrize("seed", range(20))
-def test_an_error_that_jumps_still_gives_a_count_that_does(seed):
+def test_a_noisy_error_still_gives_a_sufficient_count(seed):
     rng = np.random.default_rng(seed)
     noise = rng.uniform(0.8, 1.25, 10_001)
     error_at, tried = counted(lambda n: 500 / n * noise[n])
@@ -38,19 +38,19 @@ def test_an_error_that_jumps_still_gives_a_count_that_does(seed):
     assert len(set(tried)) == len(tried) <= 17
 
 
-def test_an_error_out_of_reach_is_told_by_the_largest_count():
+def test_an_error_out_of_reach_returns_the_largest_count():
     error_at, tried = counted(lambda n: 2.0)
     assert smallest_count(error_at, 1.0, 100, 4, 5_000) == (5_000, 2.0)
     assert max(tried) == 5_000
 
 
-def test_the_smallest_allowed_count_is_returned_where_it_does():
+def test_the_smallest_allowed_count_is_returned_if_sufficient():
     error_at, tried = counted(lambda n: 0.0)
     assert smallest_count(error_at, 1.0, 100, 4, 5_000) == (4, 0.0)
     assert len(tried) < 10
 
 
-def test_it_ends_when_told_but_not_without_a_count_that_does():
+def test_the_search_stops_early_only_with_a_sufficient_count():
     error_at, tried = counted(lambda n: 1000 / n)
     n, error = smallest_count(error_at, 1.0, 100, 4, 5_000, stop=lambda: True)
     assert error <= 1.0
