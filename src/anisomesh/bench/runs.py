@@ -23,10 +23,10 @@ from anisomesh.io.atomic import append_line, drop_cut_line
 from anisomesh.isolation import isolated
 from anisomesh.mesh.surface import Surface
 from anisomesh.repair.prepare import prepare
+from anisomesh.search import MIN_VERTICES
 
 RunRow = dict[str, Any]
 ROW_KEY = ("mesh", "input", "ratio", "method", "seed")
-_MIN_VERTICES = 4  # of a closed surface
 
 
 @dataclass(frozen=True)
@@ -193,7 +193,7 @@ def _run(job: _Job, loaded: _Loaded, suite: Suite, weights: Path | None) -> RunR
         return {**job.start, "status": "skipped", "error": "the mesh is open"}
     if remesher.missing:
         return {**job.start, "status": "absent", "error": f"{', '.join(remesher.missing)} not installed"}
-    n = max(_MIN_VERTICES, round(job.ratio * loaded.clean.n_points))
+    n = max(MIN_VERTICES, round(job.ratio * loaded.clean.n_points))
     start = time.perf_counter()
     try:
         run = isolated(remesher.run) if remesher.isolated else remesher.run

@@ -18,7 +18,7 @@ from anisomesh.options import DeviceName, EmbeddingName, RemeshOptions
 if TYPE_CHECKING:
     from anisomesh.mesh.surface import Surface
 
-DEFAULTS = RemeshOptions()
+DEFAULT_OPTIONS = RemeshOptions()
 _option = partial(typer.Option, rich_help_panel="Remeshing")
 _Command = TypeVar("_Command", bound=Callable[..., None])
 
@@ -120,7 +120,9 @@ def takes_remesh_options(*names: str) -> Callable[[_Command], _Command]:
     def decorate(command: _Command) -> _Command:
         own = [p for p in signature(command, eval_str=True).parameters.values() if p.kind is not Parameter.VAR_KEYWORD]
         added = [
-            Parameter(name, Parameter.KEYWORD_ONLY, default=getattr(DEFAULTS, name), annotation=REMESH_OPTIONS[name])
+            Parameter(
+                name, Parameter.KEYWORD_ONLY, default=getattr(DEFAULT_OPTIONS, name), annotation=REMESH_OPTIONS[name]
+            )
             for name in names
         ]
         command.__signature__ = Signature([*own, *added])  # type: ignore[attr-defined]

@@ -104,10 +104,10 @@ def check_picture_path(path: Path, option: str) -> None:
     AnisomeshError
         If nothing can be drawn on this machine.
     """
-    from anisomesh.viz import FORMATS, require_renderer
+    from anisomesh.viz import PICTURE_FORMATS, require_renderer
 
-    if path.suffix.lower() not in FORMATS:
-        raise typer.BadParameter(f"{option} {path}: expected a file name ending in {' or '.join(FORMATS)}")
+    if path.suffix.lower() not in PICTURE_FORMATS:
+        raise typer.BadParameter(f"{option} {path}: expected a file name ending in {' or '.join(PICTURE_FORMATS)}")
     require_renderer()
 
 

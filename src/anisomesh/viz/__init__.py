@@ -4,13 +4,13 @@ from anisomesh.viz.camera import PictureOptions
 from anisomesh.viz.cells import CellPolygons, voronoi_cells
 from anisomesh.viz.colouring import Colouring, distance_colouring, quality_colouring, stretch_colouring
 from anisomesh.viz.gallery import Panel, gallery
-from anisomesh.viz.page import FORMATS
+from anisomesh.viz.page import PICTURE_FORMATS
 from anisomesh.viz.renderer import require_renderer
 from anisomesh.viz.scene import side_by_side
 from anisomesh.viz.view import triangle_stretch
 
 __all__ = [
-    "FORMATS",
+    "PICTURE_FORMATS",
     "CellPolygons",
     "Colouring",
     "Panel",

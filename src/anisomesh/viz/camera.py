@@ -11,7 +11,7 @@ from anisomesh._arrays import Points, Vector3
 from anisomesh.errors import OptionError
 
 _FRAME_MARGIN = 1.12  # size of the picture over the extent of the points; heuristic
-_OBLIQUE = (0.45, 0.4)  # default view: offset to the right and upwards per unit towards the viewer; heuristic
+_OBLIQUE_OFFSETS = (0.45, 0.4)  # default view: offset to the right and upwards per unit towards the viewer; heuristic
 _MAX_Z_ALIGNMENT = 0.9  # cosine between viewing direction and z axis above which y points up; heuristic
 _MIN_UP_SINE = 1e-3  # sine between viewing direction and upward axis below which the view is refused; heuristic
 
@@ -92,7 +92,7 @@ def camera_axes(points: Points, direction: Sequence[float] | None = None, up: in
         axis = int(np.argmin(sides if up is None else np.where(np.arange(3) == up, np.inf, sides)))
         front = np.eye(3)[axis] * (-1.0 if axis == 1 else 1.0)
         above = np.eye(3)[(1 if axis == 2 else 2) if up is None else up]
-        towards = front + _OBLIQUE[0] * np.cross(above, front) + _OBLIQUE[1] * above
+        towards = front + _OBLIQUE_OFFSETS[0] * np.cross(above, front) + _OBLIQUE_OFFSETS[1] * above
     else:
         towards = np.asarray(direction, dtype=np.float64)
         length = float(np.linalg.norm(towards))

@@ -11,7 +11,7 @@ from anisomesh.io.atomic import atomic_path
 from anisomesh.viz.colouring import Colouring
 from anisomesh.viz.draw import INK, Pixels
 
-FORMATS = (".png", ".pdf")
+PICTURE_FORMATS = (".png", ".pdf")
 ACCENT, PALE = "#c8321e", "#5b626e"
 _PIXELS_PER_INCH = 128  # a power of two, so that sizes in inches are exact and panels keep their pixels
 _MIN_TEXT_LENGTH = 8  # characters that a shortened line keeps; heuristic
@@ -20,15 +20,15 @@ Box = tuple[float, float, float, float]
 
 
 def check_format(path: str | Path) -> None:
-    """Check that the suffix of a file name is one of :data:`FORMATS`.
+    """Check that the suffix of a file name is one of :data:`PICTURE_FORMATS`.
 
     Raises
     ------
     OptionError
         If the suffix is not supported.
     """
-    if Path(path).suffix.lower() not in FORMATS:
-        raise OptionError(f"{path}: expected a file name ending in {' or '.join(FORMATS)}")
+    if Path(path).suffix.lower() not in PICTURE_FORMATS:
+        raise OptionError(f"{path}: expected a file name ending in {' or '.join(PICTURE_FORMATS)}")
 
 
 class Page:
@@ -102,7 +102,7 @@ class Page:
         Raises
         ------
         OptionError
-            If the suffix is not one of :data:`FORMATS`.
+            If the suffix is not one of :data:`PICTURE_FORMATS`.
         MeshFileError
             If the file cannot be written.
         """
