@@ -31,6 +31,7 @@ def main(out: str = "gallery.png") -> None:
         print(f"{name}: {note}")
     options = PictureOptions(scale=2)
     gallery(panels, out, columns=3, same_view=True, colour_bar=panels[-1].colouring, options=options)
+    print(f"wrote {out}")
 
 
 if __name__ == "__main__":
