@@ -17,7 +17,7 @@ from anisomesh.mesh.surface import Surface
 _ON_SIDE_WEIGHT = 1e-6  # barycentric coordinate below which a point lies on a side; heuristic, far above rounding
 _QUERIES_PER_BLOCK = 16_384  # bounds the temporary arrays of `locate` to a few megabytes
 _NORMAL_OFFSET = 0.01  # offset of the second and third query of `clearly_facing` over sqrt(2 area); heuristic
-_MIN_FACING_COSINE = 1e-3  # cosine above which two normals agree clearly; heuristic
+_MIN_AGREEMENT_COSINE = 1e-3  # cosine above which two normals agree clearly; heuristic
 _NORMAL_ROUNDING = 1e-9  # generous bound on the rounding of cosines and of sums of unit normals
 _COINCIDENT_DISTANCE = 1e-7  # of the bounding-box diagonal: facets no farther apart coincide; heuristic
 _FLAT_SQUARED_RATIO = 1e-20  # (2 area / longest side^2)^2 up to which a triangle is treated as a segment; heuristic
@@ -92,7 +92,7 @@ class ClosestPoints:
         centre = corners.mean(axis=1)
         offset = _NORMAL_OFFSET * unit(normals) * np.sqrt(np.linalg.norm(normals, axis=1, keepdims=True))
         cosines = [self._cosines(normals, query) for query in (centre, centre + offset, centre - offset)]
-        return np.asarray(np.min(cosines, axis=0) > _MIN_FACING_COSINE)
+        return np.asarray(np.min(cosines, axis=0) > _MIN_AGREEMENT_COSINE)
 
     def _cosines(self, normals: Vectors, queries: Vectors) -> npt.NDArray[np.float64]:
         """Return the cosine (n,) between normals (n, 3) of any length and the pseudonormals closest to the queries.
@@ -102,7 +102,7 @@ class ClosestPoints:
         facet, weights = self.locate(queries)
         normals = unit(normals)
         cosines = np.einsum("nx,nx->n", normals, unit(self.normals_at(facet, weights)))
-        opposed = np.flatnonzero(cosines < _MIN_FACING_COSINE)
+        opposed = np.flatnonzero(cosines < _MIN_AGREEMENT_COSINE)
         if len(opposed) == 0 or self._opposite_facets.nnz == 0:
             return np.asarray(cosines)
         table = self._opposite_facets

@@ -11,7 +11,7 @@ import numpy.typing as npt
 
 from anisomesh._arrays import Faces, FaceVectors, Points, PointVectors, Vector3
 
-_MIN_THICKNESS = 1e-8  # area over squared longest side; thinner triangles have normals that are rounding; heuristic
+_FLAT_THICKNESS = 1e-8  # area over squared longest side; thinner triangles have normals that are rounding; heuristic
 
 
 def face_cross(points: Points, faces: Faces) -> FaceVectors:
@@ -36,7 +36,7 @@ def thickness(corners: npt.NDArray[np.float64]) -> npt.NDArray[np.float64]:
 
 def is_flat(corners: npt.NDArray[np.float64]) -> npt.NDArray[np.bool_]:
     """Return which triangles (n, 3, 3) have no area: a thickness below 1e-8, so that rounding decides their normal."""
-    return np.asarray(thickness(corners) < _MIN_THICKNESS)
+    return np.asarray(thickness(corners) < _FLAT_THICKNESS)
 
 
 def corner_angles(corners: npt.NDArray[np.float64]) -> npt.NDArray[np.float64]:
