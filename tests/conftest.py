@@ -2,11 +2,12 @@
 
 import contextlib
 import io
+import itertools
 import os
 import subprocess
 import sys
 import warnings
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterable, Iterator
 from pathlib import Path
 from subprocess import CompletedProcess
 from unittest import mock
@@ -23,11 +24,44 @@ hypothesis.settings.load_profile(os.environ.get("HYPOTHESIS_PROFILE") or ("ci" i
 
 CLI = [sys.executable, "-m", "anisomesh"]
 
+_COMPILE = (
+    "import anisomesh; from anisomesh.shapes.analytic import sphere\n"
+    "anisomesh.remesh(sphere(3), n_vertices=300, embedding='direct')",
+    "import anisomesh; from anisomesh.shapes.analytic import sphere; ball = sphere(3)\n"
+    "anisomesh.evaluate(ball, ball, samples=100)\n"
+    "from anisomesh.learn.inference.predict import predict\n"
+    "predict(ball.with_points(ball.points / ball.diagonal))",
+)
+"""Programs that together compile nearly all kernels."""
+
+
+def pytest_sessionstart(session: pytest.Session) -> None:
+    """Compile the kernels before several workers start, which would compile the same ones at the same time."""
+    if session.config.getoption("numprocesses", None) and not hasattr(session.config, "workerinput"):
+        from anisomesh._kernels.warmup import kernels_cached
+
+        if not all(map(kernels_cached, ("remesh", "evaluate"))):
+            programs = [subprocess.Popen([sys.executable, "-c", code], stderr=subprocess.DEVNULL) for code in _COMPILE]
+            for program in programs:
+                program.wait()  # without torch the second one fails, and the tests are skipped
+
 
 def examples(number: int) -> hypothesis.settings:
     """Return settings with this number of examples in the profile ``ci``, and at most 15 in ``dev``."""
     full = hypothesis.settings.get_current_profile_name() == "ci"
     return hypothesis.settings(max_examples=number if full else min(number, hypothesis.settings().max_examples))
+
+
+def pairwise(*values: Iterable[object]) -> list[tuple[object, ...]]:
+    """Return combinations of one value each, such that every two values of two parameters meet in one of them."""
+    combinations = list(itertools.product(*map(list, values)))
+    indices = itertools.product(*(range(len(list(options))) for options in values))
+    pairs = [set(itertools.combinations(enumerate(row), 2)) for row in indices]
+    missing, chosen = set().union(*pairs), []
+    while missing:
+        chosen.append(max(range(len(pairs)), key=lambda k: len(pairs[k] & missing)))
+        missing -= pairs[chosen[-1]]
+    return [combinations[k] for k in sorted(chosen)]
 
 
 @pytest.fixture(scope="session")

@@ -6,8 +6,6 @@ import json
 import pytest
 import trimesh
 
-from anisomesh.cli.main import main
-
 
 @pytest.fixture(scope="module")
 def demo(run_cli, tmp_path_factory):
@@ -41,11 +39,11 @@ def test_demo_refuses_a_file_in_place_of_the_folder(run_cli, tmp_path):
     assert "taken is a file" in process.stderr
 
 
-def test_demo_goes_on_without_a_picture_where_none_can_be_drawn(capsys, monkeypatch, tmp_path):
+def test_demo_goes_on_without_a_picture_where_none_can_be_drawn(run_cli, monkeypatch, tmp_path):
     find_spec = importlib.util.find_spec
     monkeypatch.setattr(importlib.util, "find_spec", lambda name: None if name == "pyvista" else find_spec(name))
-    assert main(["demo", "--out", str(tmp_path), "-n", "400"]) == 0
+    done = run_cli("demo", "--out", tmp_path, "-n", 400)
+    assert done.returncode == 0, done.stderr
     assert {path.name for path in tmp_path.iterdir()} == {"input.ply", "remeshed.ply", "report.json"}
-    out, err = capsys.readouterr()
-    assert 'pip install "anisomesh[picture]"' in err
-    assert "side_by_side.png" not in out
+    assert 'pip install "anisomesh[picture]"' in done.stderr
+    assert "side_by_side.png" not in done.stdout

@@ -2,18 +2,18 @@
 
 import importlib.util
 import re
+from functools import cache
 
 import numpy as np
 import pytest
 from PIL import Image
 
 from anisomesh import AnisomeshError
-from anisomesh.cli.main import main
 from anisomesh.viz import require_renderer
 from conftest import torus_arrays, write_obj
 
 
-@pytest.fixture
+@pytest.fixture(scope="module")
 def drawing():
     """Skip where nothing can be drawn."""
     try:
@@ -33,15 +33,16 @@ def meshes(tmp_path_factory):
     return folder
 
 
-@pytest.fixture
-def figure(drawing, meshes, monkeypatch, tmp_path):
-    """Run ``anisomesh figure`` quietly in the folder of the meshes; return the path of what it drew."""
-    monkeypatch.chdir(meshes)
+@pytest.fixture(scope="module")
+def figure(drawing, meshes, run_cli, tmp_path_factory):
+    """Run ``anisomesh figure`` quietly in the folder of the meshes, once per figure; return the path of the file."""
 
-    def run(*words, name="out.png"):
-        out = tmp_path / name
-        assert main([*map(str, ("figure", *words)), "-o", str(out), "-q", "--scale", "1"]) == 0
-        assert list(tmp_path.glob(".*")) == []
+    @cache
+    def run(*words, name="out.png", scale=1):
+        out = tmp_path_factory.mktemp("figure") / name
+        done = run_cli("figure", *words, "-o", out, "-q", "--scale", scale, cwd=meshes)
+        assert (done.returncode, done.stdout) == (0, ""), done.stderr
+        assert list(out.parent.iterdir()) == [out]
         return out
 
     return run
@@ -83,19 +84,18 @@ def test_colour_is_on_the_result_and_its_bar_below_it(figure, colour):
     assert coloured(bar[:, :800]) == 0.0
 
 
-def test_remeshing_on_the_fly_can_show_the_cells(figure, capsys):
+def test_remeshing_on_the_fly_can_show_the_cells(figure):
     image = pixels(figure("result", "fine.obj", "-n", 80, "--cells", "--colour", "distance", "--threads", 1))
     assert image.shape[1] == 2400
     assert len(np.unique(image[60:600, 1700:2300].reshape(-1, 3) // 32, axis=0)) > 10
-    assert capsys.readouterr().out == ""
 
 
-def test_the_summary_names_sizes_colour_and_file(drawing, meshes, tmp_path, capsys):
+def test_the_summary_names_sizes_colour_and_file(drawing, meshes, tmp_path, run_cli):
     out = tmp_path / "out.png"
     words = ["figure", "result", meshes / "fine.obj", meshes / "coarse.obj", "--color", "stretch", "-o", out]
-    assert main([*map(str, words), "--scale", "1"]) == 0
-    text = capsys.readouterr().out
-    assert all(part in text for part in ("512 vertices", "72 vertices", "stretch", str(out)))
+    done = run_cli(*words, "--scale", 1)
+    assert done.returncode == 0, done.stderr
+    assert all(part in done.stdout for part in ("512 vertices", "72 vertices", "stretch", str(out)))
 
 
 def test_a_pdf_is_one_page_with_text_and_the_same_each_time(figure):
@@ -107,11 +107,9 @@ def test_a_pdf_is_one_page_with_text_and_the_same_each_time(figure):
     assert data == figure("result", "fine.obj", "coarse.obj", "--colour", "stretch", name="again.pdf").read_bytes()
 
 
-def test_scale_gives_more_pixels_of_the_same_picture(figure, tmp_path, meshes):
+def test_scale_gives_more_pixels_of_the_same_picture(figure):
     small = Image.open(figure("gallery", "coarse.obj"))
-    large = tmp_path / "large.png"
-    assert main(["figure", "gallery", "coarse.obj", "-o", str(large), "-q", "--scale", "2"]) == 0
-    large = Image.open(large)
+    large = Image.open(figure("gallery", "coarse.obj", scale=2))
     assert large.size == (2 * small.width, 2 * small.height)
     shrunk = np.asarray(large.convert("RGB").resize(small.size, Image.Resampling.BOX)).astype(int)
     assert np.abs(shrunk - np.asarray(small.convert("RGB")).astype(int)).mean() < 6.0
@@ -193,40 +191,36 @@ def test_from_and_up_turn_the_camera(figure):
         (["heap", "fine.obj"], 2, "heap"),
     ],
 )
-def test_what_is_wrong_is_said_in_one_line_and_no_file_is_left(
-    drawing, meshes, monkeypatch, tmp_path, capsys, words, code, expected
-):
-    monkeypatch.chdir(tmp_path)
+def test_an_error_is_one_line_and_leaves_no_file(drawing, meshes, run_cli, tmp_path, words, code, expected):
     for name in ("fine.obj", "coarse.obj"):
         (tmp_path / name).write_bytes((meshes / name).read_bytes())
     words = words if "-o" in words or words[0] == "heap" else [*words, "-o", "out.png"]
-    assert main(["figure", *words, "-q"] if words[0] != "heap" else ["figure", *words]) == code
-    out, err = capsys.readouterr()
-    assert out == ""
-    assert len(err.splitlines()) == 1
-    assert err.startswith("anisomesh: error: ")
-    assert expected in err
+    done = run_cli("figure", *words, *(["-q"] if words[0] != "heap" else []), cwd=tmp_path)
+    assert (done.returncode, done.stdout) == (code, "")
+    assert len(done.stderr.splitlines()) == 1
+    assert done.stderr.startswith("anisomesh: error: ")
+    assert expected in done.stderr
     assert {path.name for path in tmp_path.iterdir()} == {"fine.obj", "coarse.obj"}
 
 
-def test_a_figure_without_a_kind_shows_the_kinds(capsys):
-    assert main(["figure"]) == 2
-    out = capsys.readouterr().out
-    assert all(kind in out for kind in ("result", "gallery", "strip"))
+def test_a_figure_without_a_kind_shows_the_kinds(run_cli):
+    done = run_cli("figure")
+    assert done.returncode == 2
+    assert all(kind in done.stdout for kind in ("result", "gallery", "strip"))
 
 
-def test_the_picture_of_a_remesh_may_be_a_pdf(drawing, meshes, tmp_path):
+def test_the_picture_of_a_remesh_may_be_a_pdf(drawing, meshes, run_cli, tmp_path):
     words = ["remesh", meshes / "coarse.obj", "-o", tmp_path / "out.ply", "-n", 60, "--picture", tmp_path / "both.pdf"]
-    assert main([*map(str, words), "-q"]) == 0
+    assert run_cli(*words, "-q").returncode == 0
     assert (tmp_path / "both.pdf").read_bytes().startswith(b"%PDF-")
 
 
 @pytest.mark.parametrize("missing", ["pyvista", "matplotlib"])
-def test_without_a_library_the_error_names_it_and_the_extra(missing, meshes, monkeypatch, tmp_path, capsys):
+def test_without_a_library_the_error_names_it_and_the_extra(missing, meshes, monkeypatch, tmp_path, run_cli):
     find_spec = importlib.util.find_spec
     monkeypatch.setattr(importlib.util, "find_spec", lambda name: None if name == missing else find_spec(name))
-    assert main(["figure", "gallery", str(meshes / "fine.obj"), "-o", str(tmp_path / "out.png"), "-q"]) == 1
-    err = capsys.readouterr().err
-    assert f"need {missing}" in err
-    assert "anisomesh[picture]" in err
+    done = run_cli("figure", "gallery", meshes / "fine.obj", "-o", tmp_path / "out.png", "-q")
+    assert done.returncode == 1
+    assert f"need {missing}" in done.stderr
+    assert "anisomesh[picture]" in done.stderr
     assert list(tmp_path.iterdir()) == []

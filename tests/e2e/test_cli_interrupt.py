@@ -12,6 +12,8 @@ import pytest
 from anisomesh.io.meshes import load
 from conftest import CLI
 
+pytestmark = pytest.mark.slow
+
 
 @pytest.mark.skipif(sys.platform == "win32", reason="Windows has no SIGINT for a single process")
 def test_interrupt_leaves_no_file(large_torus_obj, tmp_path):

@@ -37,6 +37,7 @@ def run_with_everything(run_process, torus_obj, tmp_path_factory):
     return folder, process
 
 
+@pytest.mark.slow
 def test_json_is_all_there_is_on_standard_output_and_equals_the_report_file(run_with_everything):
     folder, process = run_with_everything
     report = json.loads(process.stdout)
@@ -44,6 +45,7 @@ def test_json_is_all_there_is_on_standard_output_and_equals_the_report_file(run_
     assert set(report) >= REPORT_KEYS
 
 
+@pytest.mark.slow
 def test_report_agrees_with_the_mesh_that_was_written(run_with_everything):
     folder, process = run_with_everything
     report, mesh = json.loads(process.stdout), read(folder / "out.ply")
@@ -54,6 +56,7 @@ def test_report_agrees_with_the_mesh_that_was_written(run_with_everything):
     assert report["validity"]["oriented"] == mesh.is_winding_consistent
 
 
+@pytest.mark.slow
 def test_the_result_is_a_torus_of_about_the_asked_size_in_model_units(run_with_everything):
     folder, _ = run_with_everything
     mesh = read(folder / "out.ply")
@@ -63,6 +66,7 @@ def test_the_result_is_a_torus_of_about_the_asked_size_in_model_units(run_with_e
     assert mesh.volume == pytest.approx(2 * np.pi**2 * 0.35**2, rel=0.05)
 
 
+@pytest.mark.slow
 def test_stage_seconds_do_not_exceed_the_total(run_with_everything):
     seconds = json.loads(run_with_everything[1].stdout)["seconds"]
     assert {"load", "prepare", "metric", "embed", "cvt", "dual", "total"} <= set(seconds)
@@ -70,6 +74,7 @@ def test_stage_seconds_do_not_exceed_the_total(run_with_everything):
     assert sum(value for stage, value in seconds.items() if stage != "total") <= seconds["total"] + 0.05
 
 
+@pytest.mark.slow
 def test_only_the_files_asked_for_are_written(run_with_everything):
     folder, _ = run_with_everything
     assert {path.name for path in folder.iterdir()} == {"out.ply", "report.json", "rvd.vtu", "both.png"}
@@ -77,6 +82,7 @@ def test_only_the_files_asked_for_are_written(run_with_everything):
     assert all(path.stat().st_size > 500 for path in folder.iterdir())
 
 
+@pytest.mark.slow
 def test_progress_goes_to_standard_error_in_plain_lines(run_with_everything):
     lines = run_with_everything[1].stderr.splitlines()
     assert 3 <= len(lines) <= 60

@@ -43,6 +43,7 @@ def test_own_metric_keeps_the_open_cylinder(stretch_along_z):
     assert (validity["boundary_loops"], validity["components"], validity["euler"]) == (2, 1, 0)
 
 
+@pytest.mark.slow
 def test_gallery_draws_the_results(tmp_path, capsys):
     from PIL import Image
 
@@ -52,6 +53,7 @@ def test_gallery_draws_the_results(tmp_path, capsys):
     assert "three.png" in capsys.readouterr().out
 
 
+@pytest.mark.slow
 def test_noisy_scan_is_better_with_the_network(tmp_path, capsys):
     pytest.importorskip("torch")
     example("noisy_scan").main(str(tmp_path / "noisy.png"))

@@ -46,6 +46,7 @@ def folder(tmp_path):
     return folder
 
 
+@pytest.mark.slow
 def test_a_build_keeps_drops_and_lists_and_a_second_one_does_nothing(folder, tmp_path):
     out, calls = tmp_path / "out", []
     recipe = Recipe(target=200, variants=("decimated",), min_stretch=1.2)
@@ -71,6 +72,7 @@ def test_a_build_keeps_drops_and_lists_and_a_second_one_does_nothing(folder, tmp
     assert {row["name"] for row, _, _ in calls} == {"egg", rows[-1]["name"]}  # what has changed, or is gone
 
 
+@pytest.mark.slow
 def test_a_build_that_was_killed_goes_on(folder, tmp_path):
     out = tmp_path / "out"
     code = (
@@ -102,6 +104,7 @@ def test_a_build_that_was_killed_goes_on(folder, tmp_path):
     assert len(read_manifest(out)) == 5
 
 
+@pytest.mark.slow
 def test_the_list_has_the_sources_asked_for_and_their_present_families(folder, tmp_path):
     out, recipe = tmp_path / "out", Recipe(target=200, variants=())
     build(sources_of(folder, 2), out, recipe, remesh, workers=2)
@@ -147,6 +150,7 @@ def test_wrong_folders_and_lists_are_refused(tmp_path):
         sources_of(tmp_path, 0)
 
 
+@pytest.mark.slow
 def test_the_command_builds_and_tells(run_cli, folder, tmp_path):
     words = ("dataset", "build", folder, tmp_path / "out", "--target", 200, "--blobs", 1, "--parts", 1, "--no-variants")
     done = run_cli(*words)

@@ -1,5 +1,7 @@
 """Remeshing with the network that comes with the package."""
 
+from functools import cache
+
 import numpy as np
 import pytest
 
@@ -23,6 +25,18 @@ def egg():
     return surface.with_points(surface.points / surface.diagonal)
 
 
+@pytest.fixture(scope="module")
+def remeshed_egg(egg):
+    """Return a function of an embedding: the result for the egg and its evaluation, computed once."""
+
+    @cache
+    def run(embedding):
+        result = anisomesh.remesh(egg, n_vertices=400, embedding=embedding)
+        return result, evaluate(egg, result.surface, samples=20_000)
+
+    return run
+
+
 def unit_torus(n_major=90, n_minor=36):
     surface = torus(1.0, 0.4, n_major, n_minor)
     return surface.with_points(surface.points / surface.diagonal)
@@ -36,19 +50,20 @@ def test_the_default_network_is_there_and_says_what_it_is():
     assert weights_path("default") == weights_path(None)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("embedding", ["neural", "hybrid"])
-def test_a_smooth_shape_is_remeshed_as_well_as_directly(egg, embedding):
+def test_a_smooth_shape_is_remeshed_as_well_as_directly(remeshed_egg, embedding):
     measured = {}
     for name in ("direct", embedding):
-        result = anisomesh.remesh(egg, n_vertices=400, embedding=name)
+        result, measured[name] = remeshed_egg(name)
         assert result.surface.n_points == 400
         assert result.noise == 0.0
         assert not result.validity.inverted
-        measured[name] = evaluate(egg, result.surface, samples=20_000)
     assert measured[embedding].shape.g_mean > measured["direct"].shape.g_mean - 0.04
     assert measured[embedding].distance.rms < 1.15 * measured["direct"].distance.rms
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("size", [0.1, 0.3, 0.5])
 def test_noise_is_taken_away(size):
     clean = unit_torus()
@@ -63,6 +78,7 @@ def test_noise_is_taken_away(size):
     assert measured["hybrid"].distance.rms < measured["direct"].distance.rms
 
 
+@pytest.mark.slow
 def test_noise_stays_where_that_is_asked_for(egg):
     noisy = with_noise(egg, 0.3, np.random.default_rng(0))
     result = anisomesh.remesh(noisy, n_vertices=300, embedding="neural", denoise=False, max_iterations=20)
@@ -74,6 +90,7 @@ def test_noise_stays_where_that_is_asked_for(egg):
     assert any("noise" in warning for warning in taken.warnings)
 
 
+@pytest.mark.slow
 def test_an_error_from_the_noisy_input_leaves_the_noise(egg):
     noisy = with_noise(egg, 0.3, np.random.default_rng(0))
     error = 0.03
@@ -105,6 +122,7 @@ def voxels(n=16):
     return prepare(Surface(points, np.concatenate([faces[:, [0, 1, 2]], faces[:, [0, 2, 3]]]))).surface
 
 
+@pytest.mark.slow
 def test_steps_of_voxels_are_no_noise():
     ball = voxels()
     assert predict(ball.with_points(ball.points / ball.diagonal)).noise > NOISE_FLOOR  # it looks like some

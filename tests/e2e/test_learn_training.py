@@ -89,6 +89,7 @@ def weights(folder):
     return load_weights(folder / WEIGHTS)[0].state_dict()
 
 
+@pytest.mark.slow
 def test_a_run_learns_and_writes_its_files(files, tmp_path):
     rows = train(options(tmp_path / "run", epochs=12, rate=1e-2), files)
     assert [row["epoch"] for row in rows] == list(range(1, 13))
@@ -106,6 +107,7 @@ def test_a_run_learns_and_writes_its_files(files, tmp_path):
     assert facts["epoch"] == best["epoch"]
 
 
+@pytest.mark.slow
 def test_a_run_that_was_stopped_in_its_validation_goes_on(files, uninterrupted, tmp_path, monkeypatch):
     whole, _ = uninterrupted(NETWORK)
     example, seen = StretchTask.example, []
@@ -124,12 +126,14 @@ def test_a_run_that_was_stopped_in_its_validation_goes_on(files, uninterrupted, 
     assert seen.count(True) == 4 * len(files.training)  # no step was made twice
 
 
+@pytest.mark.slow
 def test_a_loss_that_is_no_number_ends_the_run_and_leaves_its_checkpoint(files, tmp_path):
     with pytest.raises(DivergedError, match="lower rate"):
         train(options(tmp_path / "run", rate=1e30, warmup=0), files)
     assert not (tmp_path / "run" / WEIGHTS).exists()
 
 
+@pytest.mark.slow
 def test_a_run_does_not_go_on_with_other_items_or_without_a_checkpoint(files, tmp_path):
     with pytest.raises(OptionError, match="without --resume"):
         train(options(tmp_path / "none"), files, resume=True)
@@ -143,6 +147,7 @@ def test_a_run_does_not_go_on_with_other_items_or_without_a_checkpoint(files, tm
             train(options(tmp_path / "run", epochs=1), other, resume=True)
 
 
+@pytest.mark.slow
 def test_a_run_goes_on_without_the_weights_that_it_started_from(files, tmp_path):
     train(options(tmp_path / "first", epochs=1), files)
     start = tmp_path / "first" / WEIGHTS
@@ -185,6 +190,7 @@ def test_sizes_that_no_network_has_are_refused(kind, sizes):
         kind(**sizes)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("stop_after", "network"), [(1, NETWORK), (2, NETWORK), (3, NETWORK), (2, PAPER)])
 def test_a_run_that_was_stopped_goes_on_as_if_it_had_not_been(files, uninterrupted, tmp_path, stop_after, network):
     options = partial(options_with, network=network)
@@ -204,6 +210,7 @@ def test_a_run_that_was_stopped_goes_on_as_if_it_had_not_been(files, uninterrupt
         torch.testing.assert_close(weights(tmp_path / "cut")[name], value, rtol=0, atol=0)
 
 
+@pytest.mark.slow
 def test_a_run_starts_from_weights_and_refuses_those_of_another_network(files, tmp_path):
     first = train(options(tmp_path / "one", epochs=8, rate=1e-2), files)
     given = tmp_path / "one" / WEIGHTS
@@ -214,12 +221,14 @@ def test_a_run_starts_from_weights_and_refuses_those_of_another_network(files, t
         train(options(tmp_path / "three", start="default"), files)
 
 
+@pytest.mark.slow
 def test_handlers_of_signals_are_as_before(files, tmp_path):
     before = signal.getsignal(signal.SIGTERM), signal.getsignal(signal.SIGINT)
     train(options(tmp_path / "run", epochs=1), files)
     assert (signal.getsignal(signal.SIGTERM), signal.getsignal(signal.SIGINT)) == before
 
 
+@pytest.mark.slow
 def test_a_run_is_not_overwritten_and_not_mixed_with_another(files, tmp_path):
     train(options(tmp_path / "run", epochs=1), files)
     with pytest.raises(OptionError, match="--resume"):
@@ -303,6 +312,7 @@ def test_every_run_of_the_default_network_starts_from_the_one_before():
         assert after.start == str(Path(before.out) / WEIGHTS)
 
 
+@pytest.mark.slow
 def test_the_command_trains_stops_and_resumes(files, tmp_path, run_cli):
     (tmp_path / "a.toml").write_text(
         CONFIG.replace('"items"', f'"{files.training[0].parent}"').replace("epochs = 2", "epochs = 60")
@@ -323,6 +333,7 @@ def test_the_command_trains_stops_and_resumes(files, tmp_path, run_cli):
     assert f"epoch {before}:" not in done.stderr
 
 
+@pytest.mark.slow
 def test_two_workers_train_as_one(files, tmp_path):
     train(options(tmp_path / "one", epochs=2), files)
     text = CONFIG.replace('"items"', f'"{files.training[0].parent}"').replace("batch = 2", "batch = 2\nwarmup = 2")
@@ -349,6 +360,7 @@ def test_two_workers_train_as_one(files, tmp_path):
     assert done.stderr.count("epoch 2:") == 1
 
 
+@pytest.mark.slow
 def test_a_remesh_takes_the_metric_of_a_trained_network(files, tmp_path, run_cli):
     surface = load_item(files.validation[0]).surface
     train(options(tmp_path / "run", epochs=12, rate=1e-2), files)
@@ -373,6 +385,7 @@ def test_a_remesh_takes_the_metric_of_a_trained_network(files, tmp_path, run_cli
         anisomesh.remesh(surface, n_vertices=150, embedding="neural", weights=weights, metric="uniform")
 
 
+@pytest.mark.slow
 def test_without_torch_the_error_names_the_extra(tmp_path, torus_obj):
     code = (
         "import sys; sys.modules['torch'] = None\n"
@@ -389,6 +402,7 @@ def test_without_torch_the_error_names_the_extra(tmp_path, torus_obj):
     assert 'pip install "anisomesh[learn]"' in second
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("loss", ["dot", "l2", "cosine"])
 def test_the_network_of_the_paper_learns_too_and_embeds(files, tmp_path, loss):
     rows = train(options(tmp_path / "run", epochs=10, rate=1e-2, network=PAPER, loss=loss, noise_share=0.0), files)

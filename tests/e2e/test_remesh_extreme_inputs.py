@@ -91,6 +91,7 @@ VALID = {
 }
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", VALID)
 def test_a_valid_mesh_comes_out(name):
     make, n = VALID[name]

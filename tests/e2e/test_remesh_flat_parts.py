@@ -10,6 +10,8 @@ from anisomesh.features.detect import corners, points_along, sharp_edges
 from anisomesh.shapes.analytic import box
 from anisomesh.shapes.parts import sparse_parts
 
+pytestmark = pytest.mark.slow
+
 PARTS = {
     "cube of twelve triangles": (lambda: box(n=1), 200),
     "cube at a fifth": (lambda: box(n=4), 20),

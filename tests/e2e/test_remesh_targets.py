@@ -44,6 +44,7 @@ def test_sites_at_the_same_place_are_made_up_for():
         assert anisomesh.remesh(surface, n_vertices=n, max_iterations=10).surface.n_points == n
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("share", [0.01, 0.002])
 @pytest.mark.parametrize("shape", [ellipsoid((2.0, 1.0, 0.5), 4), cad_part(8)], ids=["ellipsoid", "part"])
 def test_a_result_is_within_the_error_asked_for(shape, share):
@@ -77,6 +78,7 @@ def helix(around=48, along=28):
     return surface, np.stack([first, first + around + 1], axis=1)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("sharpness", [1.0, 7.0])
 def test_edges_named_are_edges_of_the_result(sharpness):
     surface, pairs = helix()
@@ -150,6 +152,7 @@ def test_lengths_that_are_none_are_refused(run_cli, tmp_path, torus_obj, text):
     assert len(done.stderr.strip().splitlines()) == 1
 
 
+@pytest.mark.slow
 def test_a_time_limit_ends_the_optimisation_and_says_so():
     surface = torus(n_major=120, n_minor=60)
     anisomesh.remesh(sphere(2), n_vertices=50)  # so that everything is compiled

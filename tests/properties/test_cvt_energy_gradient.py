@@ -7,6 +7,7 @@ from embedded import embedded_surface
 
 from anisomesh.shapes import analytic as shapes
 from anisomesh.voronoi.restricted import RestrictedVoronoi
+from conftest import pairwise
 
 SHAPES = {
     "sphere": lambda: shapes.sphere(1),
@@ -14,7 +15,7 @@ SHAPES = {
     "box": lambda: shapes.box((1.0, 0.6, 0.3), n=2),
     "part": lambda: shapes.cad_part(3),
 }
-PAPER = pytest.mark.parametrize("sharpness", [1.0, 3.0, 7.0])
+SHARPNESS = [1.0, 3.0, 7.0]
 
 
 def make(shape, dimension, n, seed=0):
@@ -25,9 +26,7 @@ def make(shape, dimension, n, seed=0):
     return RestrictedVoronoi(embedded_surface(points, surface.faces)), sites, rng
 
 
-@pytest.mark.parametrize("shape", ["sphere", "box"])
-@pytest.mark.parametrize("dimension", [3, 6, 8])
-@PAPER
+@pytest.mark.parametrize(("shape", "dimension", "sharpness"), pairwise(["sphere", "box"], [3, 6, 8], SHARPNESS))
 def test_energy_and_masses_match_the_definition(shape, dimension, sharpness):
     voronoi, sites, _ = make(shape, dimension, 12)
     embedded = voronoi.embedded
@@ -42,9 +41,7 @@ def test_energy_and_masses_match_the_definition(shape, dimension, sharpness):
         np.testing.assert_allclose(found.gradient, to_centroid, atol=1e-11)
 
 
-@pytest.mark.parametrize("shape", SHAPES)
-@pytest.mark.parametrize("dimension", [3, 8])
-@PAPER
+@pytest.mark.parametrize(("shape", "dimension", "sharpness"), pairwise(SHAPES, [3, 8], SHARPNESS))
 def test_gradient_is_the_complex_step_derivative_through_the_symbolic_vertices(shape, dimension, sharpness):
     voronoi, sites, _ = make(shape, dimension, 15)
     found = voronoi.integrate(sites, sharpness)
@@ -55,9 +52,7 @@ def test_gradient_is_the_complex_step_derivative_through_the_symbolic_vertices(s
     np.testing.assert_allclose(found.gradient, gradient, rtol=0, atol=1e-8 * scale)
 
 
-@pytest.mark.parametrize("shape", SHAPES)
-@pytest.mark.parametrize("dimension", [3, 8])
-@PAPER
+@pytest.mark.parametrize(("shape", "dimension", "sharpness"), pairwise(SHAPES, [3, 8], SHARPNESS))
 def test_gradient_is_the_limit_of_central_differences(shape, dimension, sharpness):
     voronoi, sites, rng = make(shape, dimension, 120, seed=4)
     gradient = voronoi.integrate(sites, sharpness).gradient

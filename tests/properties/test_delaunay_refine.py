@@ -16,6 +16,7 @@ from anisomesh.shapes import analytic as shapes
 from anisomesh.voronoi.cells import cell_complex
 from anisomesh.voronoi.embedded_surface import EmbeddedSurface
 from anisomesh.voronoi.restricted import RestrictedVoronoi
+from conftest import pairwise
 
 CASES = {
     "torus": (lambda: shapes.torus(n_major=32, n_minor=14), 8),
@@ -35,9 +36,7 @@ def case(shape, n=None):
     return voronoi, lloyd(voronoi, sites, 5)
 
 
-@pytest.mark.parametrize("crease_angle", [30.0, 180.0])
-@pytest.mark.parametrize("shape", CASES)
-@pytest.mark.parametrize("factor", [1, 6])
+@pytest.mark.parametrize(("shape", "factor", "crease_angle"), pairwise(CASES, (1, 6), (30.0, 180.0)))
 def test_the_mesh_is_closed_with_the_topology_of_the_surface(shape, factor, crease_angle):
     voronoi, sites = case(shape, factor * CASES[shape][1])
     surface = voronoi.embedded.surface
@@ -72,6 +71,7 @@ def test_the_mesh_of_a_scaled_embedding_is_in_space():
     np.testing.assert_allclose(np.linalg.norm(result.points, axis=1), 1.0, atol=0.1)
 
 
+@pytest.mark.slow
 def test_small_components_keep_their_shape_with_few_sites():
     """Regression: a component with one or two sites had no triangle in the dual and was lost without a warning."""
     ball = shapes.sphere(1)
@@ -119,6 +119,7 @@ def test_creases_close_together_do_not_attract_rows_of_sites(width):
     assert Surface(result.points, result.faces).edge_lengths.min() > 0.03  # the sites are about 0.17 apart
 
 
+@pytest.mark.slow
 def test_sites_are_added_where_triangles_intersect(monkeypatch):
     """Folds near each other that triangles of this size cut through."""
     sheet = shapes.open_patch(lambda x, y: 0.0 * x, n=64)

@@ -192,6 +192,7 @@ def test_spread_sites_are_on_the_boundary_one_for_each_long_interval():
     assert on_boundary.sum() == pytest.approx(4.0 / features.spacing, rel=0.2)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("sharpness", [1.0, 7.0])
 @pytest.mark.parametrize("name", OPEN)
 def test_a_remesh_keeps_the_boundary(name, sharpness):

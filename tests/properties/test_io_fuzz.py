@@ -12,6 +12,8 @@ from anisomesh.errors import MeshFileError
 from anisomesh.io.meshes import MESH_FORMATS, load, save
 from anisomesh.mesh.surface import Surface
 
+pytestmark = pytest.mark.slow
+
 CASES = 2_300  # of each kind of file
 MOST_BYTES = 8 * 2**20  # more than any of these files has a right to
 MOST_SECONDS = 2.0

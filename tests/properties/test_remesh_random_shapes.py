@@ -11,6 +11,8 @@ from anisomesh.pipeline import remesh
 from anisomesh.repair.prepare import prepare
 from conftest import examples
 
+pytestmark = pytest.mark.slow
+
 
 @pytest.mark.parametrize("make", SHAPES)
 @examples(8)

@@ -16,7 +16,7 @@ from anisomesh.mesh import topology
 from anisomesh.mesh.surface import Surface
 from anisomesh.repair.prepare import Prepared, prepare
 from anisomesh.shapes import analytic as shapes
-from conftest import examples
+from conftest import examples, pairwise
 
 TETRAHEDRON = np.array([[0, 2, 1], [0, 1, 3], [1, 2, 3], [2, 0, 3]])
 
@@ -127,9 +127,9 @@ def two_boxes(shift, n=2):
     return Surface(points, np.concatenate([box.faces, box.faces + box.n_points]))
 
 
-@pytest.mark.parametrize("shift", [(1, 1, 0), (1, 1, 1), (0, 1, 1)])
-@pytest.mark.parametrize("shared", [True, False])
-@pytest.mark.parametrize("seed", range(3))
+@pytest.mark.parametrize(
+    ("shift", "shared", "seed"), pairwise([(1, 1, 0), (1, 1, 1), (0, 1, 1)], [True, False], range(3))
+)
 def test_boxes_that_touch_stay_two_closed_boxes(shift, shared, seed):
     pair = two_boxes(np.array(shift, dtype=float))
     faces = pair.faces

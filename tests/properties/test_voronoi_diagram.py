@@ -12,7 +12,7 @@ from anisomesh.errors import OptionError
 from anisomesh.mesh import topology
 from anisomesh.shapes import analytic as shapes
 from anisomesh.voronoi.restricted import RestrictedVoronoi
-from conftest import examples
+from conftest import examples, pairwise
 
 SHAPES = {
     "sphere": lambda: shapes.sphere(1),
@@ -57,9 +57,7 @@ cases = pytest.mark.parametrize("shape", SHAPES)
 dimensions = pytest.mark.parametrize("dimension", [3, 6, 8])
 
 
-@cases
-@dimensions
-@pytest.mark.parametrize("n", [1, 2, 3, 4, 30, 700])
+@pytest.mark.parametrize(("shape", "dimension", "n"), pairwise(SHAPES, (3, 6, 8), (1, 2, 3, 4, 30, 700)))
 def test_polygons_partition_every_facet_and_are_nearest_to_their_sites(shape, dimension, n):
     points, faces, sites = make(shape, dimension, n, seed=n)
     diagram = RestrictedVoronoi(embedded_surface(points, faces)).diagram(sites)

@@ -22,9 +22,11 @@ def test_importing_the_package_loads_nothing_heavy():
     assert not modules_after("import anisomesh") & (HEAVY | {"numpy"})
 
 
-@pytest.mark.parametrize("words", ["", "remesh", "info", "demo", "figure", "figure result", "figure strip"])
-def test_help_loads_nothing_heavy(words):
-    code = f"from anisomesh.cli.main import main\nassert main({[*words.split(), '--help']!r}) == 0"
+def test_help_loads_nothing_heavy():
+    commands = ["", "remesh", "info", "demo", "figure", "figure result", "figure strip"]
+    code = "from anisomesh.cli.main import main\n" + "".join(
+        f"assert main({[*words.split(), '--help']!r}) == 0\n" for words in commands
+    )
     assert not modules_after(code) & HEAVY
 
 

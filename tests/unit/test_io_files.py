@@ -286,6 +286,7 @@ def test_atomic_path_follows_links_and_keeps_the_mode(tmp_path):
     assert sorted(tmp_path.iterdir()) == [link, real]
 
 
+@pytest.mark.slow
 def test_common_formats_need_no_heavy_library(tmp_path):
     for suffix in (".obj", ".off", ".ply", ".stl", ".mesh"):
         save(BOX, tmp_path / f"a{suffix}")

@@ -5,9 +5,11 @@ import subprocess
 import sys
 
 import numpy as np
+import pytest
 
 PROGRAM = """
 import numpy as np
+import pytest
 from anisomesh._kernels import predicates, warmup
 from anisomesh.voronoi.embedded_surface import EmbeddedSurface
 from anisomesh.voronoi.restricted import RestrictedVoronoi
@@ -24,6 +26,7 @@ np.savez(
 """
 
 
+@pytest.mark.slow
 def test_kernels_give_the_same_result_without_compilation(tmp_path):
     results = []
     for disabled in ("1", "0"):

@@ -65,6 +65,7 @@ def test_damaged_files_are_refused(tmp_path, damage):
         load_item(path)
 
 
+@pytest.mark.slow
 def test_a_given_mesh_is_an_item_with_the_metric_measured_on_it():
     surface = ellipsoid((1.0, 0.5, 0.3), 4)  # 2,562 points
     recipe = Recipe(target=1_500, variants=("given",))
@@ -79,6 +80,7 @@ def test_a_given_mesh_is_an_item_with_the_metric_measured_on_it():
     np.testing.assert_allclose(item.tensors, wanted, rtol=1e-3, atol=1e-3)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("reason", ["needles", "many points", "even as it is"])
 def test_a_given_mesh_is_no_item_if_nothing_is_to_be_learnt_from_it(reason):
     surface = ellipsoid((1.0, 0.5, 0.3), 3)
@@ -88,6 +90,7 @@ def test_a_given_mesh_is_no_item_if_nothing_is_to_be_learnt_from_it(reason):
     assert [entry.kind for entry in items_of_mesh(surface, recipe, np.random.default_rng(0), remesh)] == ["even"]
 
 
+@pytest.mark.slow
 def test_the_items_of_a_mesh_are_its_even_mesh_and_the_variants(made):
     assert [entry.kind for entry in made] == ["even", "decimated", "stretched"]
     even = made[0].item.surface
@@ -104,6 +107,7 @@ def test_the_items_of_a_mesh_are_its_even_mesh_and_the_variants(made):
     assert shapes[2] < 0.75 * shapes[0]
 
 
+@pytest.mark.slow
 def test_variants_have_the_metric_of_the_clean_mesh_not_their_own(made):
     clean = made[0].item
     for entry in made[1:]:
@@ -116,6 +120,7 @@ def test_variants_have_the_metric_of_the_clean_mesh_not_their_own(made):
     assert exact.mean() > 0.9  # decimation keeps points
 
 
+@pytest.mark.slow
 def test_items_of_shapes_by_code_have_exact_curvature_at_every_point():
     blobs = Blobs.random(np.random.default_rng(3))
     made = items_of_blobs(blobs, RECIPE, np.random.default_rng(0), remesh)
@@ -130,12 +135,14 @@ def test_items_of_shapes_by_code_have_exact_curvature_at_every_point():
     np.testing.assert_allclose(frames, frames[0], rtol=0.15)
 
 
+@pytest.mark.slow
 def test_round_and_flat_shapes_are_unsuitable():
     for shape in (sphere(3), box(n=8)):
         with pytest.raises(UnsuitableError, match="flat or round everywhere"):
             items_of_mesh(shape, Recipe(target=500, min_stretch=1.35), np.random.default_rng(0), remesh)
 
 
+@pytest.mark.slow
 def test_an_even_mesh_of_the_right_size_is_left_alone_and_others_are_not():
     good = sphere(3)
     assert even_mesh(good, Recipe(target=600), remesh) is good
@@ -149,6 +156,7 @@ def test_an_even_mesh_of_the_right_size_is_left_alone_and_others_are_not():
         assert thickness(made.points[made.faces]).mean() > 0.3
 
 
+@pytest.mark.slow
 def test_the_same_seed_gives_the_same_items(made):
     again = items_of_mesh(ellipsoid((1.0, 0.5, 0.3), 3), RECIPE, np.random.default_rng(0), remesh)
     for first, second in zip(made, again, strict=True):
@@ -162,6 +170,7 @@ def test_recipes_that_cannot_be_are_refused(wrong):
         Recipe(**wrong)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("surface", [box(n=3), torus()])
 def test_evening_with_tetwild_keeps_the_shape_and_which_side_is_out(surface):
     pytest.importorskip("pytetwild")

@@ -232,6 +232,7 @@ def test_the_loss_of_offsets_is_zero_for_the_answer_and_for_motion_along_a_plane
     assert float(offset_loss(rough, wanted, up, edges, weight)) == pytest.approx(3.0, abs=0.05)
 
 
+@pytest.mark.slow
 def test_a_network_learns_one_shape():
     torch.manual_seed(0)
     task = StretchTask(TrainingOptions(data="", out="", network=SMALL))

@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 
 from anisomesh.search import COUNT_PRECISION, smallest_count
+from conftest import pairwise
 
 
 def counted(function):
@@ -16,9 +17,9 @@ def counted(function):
     return error_at, tried
 
 
-@pytest.mark.parametrize("power", [0.5, 1.0, 2.0])
-@pytest.mark.parametrize("answer", [4, 5, 37, 1_000, 99_000])
-@pytest.mark.parametrize("first", [4, 300, 100_000])
+@pytest.mark.parametrize(
+    ("power", "answer", "first"), pairwise([0.5, 1.0, 2.0], [4, 5, 37, 1_000, 99_000], [4, 300, 100_000])
+)
 def test_the_smallest_count_is_found_to_three_per_cent(power, answer, first):
     error_at, tried = counted(lambda n: (answer / n) ** power)
     n, error = smallest_count(error_at, 1.0, first, 4, 100_000)
