@@ -32,6 +32,4 @@ def test_metric_hardly_depends_on_the_order_of_points_and_faces(kind):
     faces = back[SURFACE.faces][rng.permutation(SURFACE.n_faces)]
     shuffled = type(SURFACE)(SURFACE.points[order], faces)
     expected = compute_metric(SURFACE, kind)
-    np.testing.assert_allclose(
-        compute_metric(shuffled, kind)[back], expected, atol=0.03 * np.abs(expected).max()
-    )
+    np.testing.assert_allclose(compute_metric(shuffled, kind)[back], expected, atol=0.03 * np.abs(expected).max())
