@@ -73,8 +73,10 @@ def triangles_meet(first, second):
 
 
 def exact(points):
-    """Return coordinates as rational numbers; as integers, which are faster, where they are."""
-    return [[int(x) if float(x).is_integer() else Fraction(float(x)) for x in row] for row in points]
+    """Return coordinates as integers, in a power of two as unit; integers are faster than rational numbers."""
+    ratios = [[float(x).as_integer_ratio() for x in row] for row in points]
+    unit = max(denominator for row in ratios for _, denominator in row)
+    return [[numerator * (unit // denominator) for numerator, denominator in row] for row in ratios]
 
 
 def naive_pairs(surface):
