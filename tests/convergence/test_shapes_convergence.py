@@ -1,4 +1,4 @@
-"""Area and volume of the made shapes approach their closed forms at second order."""
+"""Area and volume of the procedural shapes approach their closed forms at second order."""
 
 from math import pi
 

@@ -1,4 +1,4 @@
-"""``anisomesh benchmark``: rows, reports, going on after an end of any kind, failures as rows."""
+"""``anisomesh benchmark``: rows, reports, resuming after an interruption or a kill, failures as rows."""
 
 import json
 import os
@@ -112,7 +112,7 @@ def test_other_options_are_run_again(tmp_path):
 
 
 @pytest.mark.slow
-def test_methods_are_given_worse_meshes_and_compared_with_the_clean_one(tmp_path, monkeypatch):
+def test_methods_get_disturbed_meshes_and_are_compared_with_the_clean_one(tmp_path, monkeypatch):
     given = {}
 
     def unchanged(surface, n, seed, options):
@@ -202,7 +202,7 @@ def test_a_foreign_file_of_rows_is_not_touched(tmp_path):
 
 @pytest.mark.slow
 @pytest.mark.parametrize("name", [name for name in methods.METHODS if name != "anisomesh"])
-def test_other_remeshers_give_about_the_vertices_asked_for(name):
+def test_other_remeshers_give_about_the_requested_number_of_vertices(name):
     remesher = methods.METHODS[name]
     if remesher.missing:
         pytest.skip(f"{', '.join(remesher.missing)} not installed")

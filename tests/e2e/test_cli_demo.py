@@ -1,4 +1,4 @@
-"""``anisomesh demo``: works from nothing and says where the results are."""
+"""``anisomesh demo``: needs no input and names its results."""
 
 import importlib.util
 import json

@@ -79,7 +79,7 @@ def test_an_output_that_cannot_be_written_is_refused_before_any_work(run_cli, to
     ],
 )
 @pytest.mark.parametrize("command", ["remesh", "info"])
-def test_a_file_that_is_no_mesh_is_one_line(refuse, tmp_path, command, name, content):
+def test_an_invalid_mesh_file_is_reported_in_one_line(refuse, tmp_path, command, name, content):
     if content is not None:
         (tmp_path / name).write_text(content)
     words = ["-o", "out.ply", "-n", 100] if command == "remesh" else []
@@ -122,7 +122,7 @@ def test_the_exit_code_of_the_process_is_the_one_of_the_command(run_process, tmp
 
 
 @pytest.mark.slow
-def test_a_closed_pipe_is_no_traceback(torus_obj):
+def test_a_closed_pipe_gives_no_traceback(torus_obj):
     with subprocess.Popen([*CLI, "info", str(torus_obj)], stdout=subprocess.PIPE, stderr=subprocess.PIPE) as process:
         process.stdout.close()
         assert process.stderr.read() == b""

@@ -1,4 +1,4 @@
-"""``anisomesh figure`` from outside: results, galleries and strips as PNG and PDF, and what is refused."""
+"""``anisomesh figure``: results, galleries and strips as PNG and PDF, and its errors."""
 
 import importlib.util
 import re

@@ -1,4 +1,4 @@
-"""``anisomesh info`` tells the truth about meshes whose facts are known."""
+"""``anisomesh info`` on meshes with known properties."""
 
 import json
 
@@ -58,7 +58,7 @@ def test_three_faces_at_an_edge_and_an_unused_point(facts, tmp_path):
     assert len(found["prepare"]["changes"]) >= 2
 
 
-def test_a_turned_face_is_found(facts, tmp_path):
+def test_an_inverted_face_is_found(facts, tmp_path):
     points, faces = torus_arrays(12, 8)
     faces[5] = faces[5][::-1]
     found = facts(write_obj(tmp_path / "turned.obj", points, faces))

@@ -75,7 +75,7 @@ def test_stage_seconds_do_not_exceed_the_total(run_with_everything):
 
 
 @pytest.mark.slow
-def test_only_the_files_asked_for_are_written(run_with_everything):
+def test_only_the_requested_files_are_written(run_with_everything):
     folder, _ = run_with_everything
     assert {path.name for path in folder.iterdir()} == {"out.ply", "report.json", "rvd.vtu", "both.png"}
     assert (folder / "both.png").read_bytes().startswith(b"\x89PNG")

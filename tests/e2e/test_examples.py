@@ -1,4 +1,4 @@
-"""The examples run, and do what their text promises."""
+"""The examples run and show what their text says."""
 
 import importlib.util
 from pathlib import Path

@@ -105,7 +105,7 @@ def test_a_build_that_was_killed_goes_on(folder, tmp_path):
 
 
 @pytest.mark.slow
-def test_the_list_has_the_sources_asked_for_and_their_present_families(folder, tmp_path):
+def test_the_manifest_has_the_requested_sources_and_their_current_families(folder, tmp_path):
     out, recipe = tmp_path / "out", Recipe(target=200, variants=())
     build(sources_of(folder, 2), out, recipe, remesh, workers=2)
     (folder / "odd.ply").mkdir()  # no mesh, in spite of its name

@@ -1,4 +1,4 @@
-"""Remeshing with the network that comes with the package."""
+"""Remeshing with the pretrained networks."""
 
 from functools import cache
 
@@ -65,7 +65,7 @@ def test_a_smooth_shape_is_remeshed_as_well_as_directly(remeshed_egg, embedding)
 
 @pytest.mark.slow
 @pytest.mark.parametrize("size", [0.1, 0.3, 0.5])
-def test_noise_is_taken_away(size):
+def test_noise_is_removed(size):
     clean = unit_torus()
     noisy = with_noise(clean, size, np.random.default_rng(0))
     found = predict(noisy)
@@ -79,7 +79,7 @@ def test_noise_is_taken_away(size):
 
 
 @pytest.mark.slow
-def test_noise_stays_where_that_is_asked_for(egg):
+def test_noise_is_kept_on_request(egg):
     noisy = with_noise(egg, 0.3, np.random.default_rng(0))
     result = anisomesh.remesh(noisy, n_vertices=300, embedding="neural", denoise=False, max_iterations=20)
     assert result.noise == 0.0
@@ -123,7 +123,7 @@ def voxels(n=16):
 
 
 @pytest.mark.slow
-def test_steps_of_voxels_are_no_noise():
+def test_voxel_steps_are_not_taken_for_noise():
     ball = voxels()
     assert predict(ball.with_points(ball.points / ball.diagonal)).noise > NOISE_FLOOR  # it looks like some
     result = anisomesh.remesh(ball, n_vertices=800, max_iterations=20)
@@ -140,7 +140,7 @@ def test_meshes_of_few_points_have_graphs_without_edges(surface):
     assert np.isfinite(found.points).all()
 
 
-def test_the_embedding_that_is_left_open_is_hybrid_for_the_curvature_metric(egg):
+def test_the_default_embedding_is_hybrid_for_the_curvature_metric(egg):
     tensors = np.tile(np.eye(3), (egg.n_points, 1, 1))
     for metric, wanted in (("curvature", "hybrid"), ("approximation", "direct"), (tensors, "direct")):
         result = anisomesh.remesh(egg, n_vertices=100, metric=metric, max_iterations=3)
@@ -158,7 +158,7 @@ def test_the_hybrid_metric_is_between_the_two(egg):
     assert low - 0.05 < means["hybrid"] < high + 0.05
 
 
-def test_weights_and_devices_that_are_not_there(egg, tmp_path):
+def test_missing_weights_and_devices_are_refused(egg, tmp_path):
     for words, kind, message in (
         ({"embedding": "neural", "weights": tmp_path / "none"}, OptionError, "none"),
         ({"embedding": "neural", "weights": "defualt"}, OptionError, "did you mean 'default'"),

@@ -1,4 +1,4 @@
-"""Training: the same losses after a stop and a resume, files that belong together, configurations that are wrong."""
+"""Training: the same losses after a stop and a resume, consistent files, invalid configurations."""
 
 import itertools
 import json
@@ -127,7 +127,7 @@ def test_a_run_that_was_stopped_in_its_validation_goes_on(files, uninterrupted, 
 
 
 @pytest.mark.slow
-def test_a_loss_that_is_no_number_ends_the_run_and_leaves_its_checkpoint(files, tmp_path):
+def test_a_loss_that_is_not_finite_ends_the_run_and_leaves_its_checkpoint(files, tmp_path):
     with pytest.raises(DivergedError, match="lower rate"):
         train(options(tmp_path / "run", rate=1e30, warmup=0), files)
     assert not (tmp_path / "run" / WEIGHTS).exists()
@@ -156,7 +156,7 @@ def test_a_run_goes_on_without_the_weights_that_it_started_from(files, tmp_path)
     train(options(tmp_path / "run", epochs=1, start="elsewhere", minutes=1.0), files, resume=True)
 
 
-def test_moments_come_back_to_their_parameters_where_some_have_none(tmp_path):
+def test_moments_are_restored_to_their_parameters_where_some_have_none(tmp_path):
     def made():
         network = torch.nn.ModuleList(torch.nn.Linear(2, 2) for _ in range(3))
         return network, torch.optim.AdamW(network.parameters())
@@ -185,7 +185,7 @@ def test_moments_come_back_to_their_parameters_where_some_have_none(tmp_path):
         (PaperOptions, {"channels": 0}),
     ],
 )
-def test_sizes_that_no_network_has_are_refused(kind, sizes):
+def test_invalid_network_sizes_are_refused(kind, sizes):
     with pytest.raises(OptionError, match=next(iter(sizes))):
         kind(**sizes)
 
@@ -211,7 +211,7 @@ def test_a_run_that_was_stopped_goes_on_as_if_it_had_not_been(files, uninterrupt
 
 
 @pytest.mark.slow
-def test_a_run_starts_from_weights_and_refuses_those_of_another_network(files, tmp_path):
+def test_a_run_starts_from_weights_and_refuses_weights_of_another_network(files, tmp_path):
     first = train(options(tmp_path / "one", epochs=8, rate=1e-2), files)
     given = tmp_path / "one" / WEIGHTS
     more = train(options(tmp_path / "two", epochs=1, rate=1e-6, start=str(given)), files)
@@ -247,7 +247,7 @@ def test_a_run_is_not_overwritten_and_not_mixed_with_another(files, tmp_path):
 
 
 @pytest.mark.parametrize("data", [b"", b"hello there", b"\xff" * 100, (10**9).to_bytes(8, "little") + b"{}"])
-def test_files_that_are_no_weights_are_refused(tmp_path, data):
+def test_invalid_weight_files_are_refused(tmp_path, data):
     (tmp_path / "a.safetensors").write_bytes(data)
     for path in (tmp_path / "a.safetensors", tmp_path / "none.safetensors"):
         with pytest.raises(WeightsError, match=r"\.safetensors: cannot be read"):
@@ -296,7 +296,7 @@ def test_folders_of_a_configuration_are_relative_to_its_file(tmp_path):
 @pytest.mark.parametrize(
     ("name", "network", "data"), [("default-more", "default", "items-given"), ("paper", "paper", "items")]
 )
-def test_pretrained_configurations_are_those_of_the_pretrained_networks(name, network, data):
+def test_pretrained_networks_have_the_options_of_their_configurations(name, network, data):
     loaded = load_training(name)
     assert (loaded.data, loaded.out) == (data, name)  # relative to the current folder
     weights, facts = load_weights(weights_path(network))

@@ -183,6 +183,6 @@ def test_a_metric_of_the_wrong_shape_or_sign_is_refused(ring):
         anisomesh.remesh(ring, n_vertices=100, metric=np.broadcast_to(-np.eye(3), (ring.n_points, 3, 3)))
 
 
-def test_what_is_no_mesh_is_refused():
+def test_values_that_are_not_meshes_are_refused():
     with pytest.raises(MeshError, match="cannot read a mesh from str"):
         anisomesh.remesh("bunny.obj", n_vertices=100)

@@ -1,4 +1,4 @@
-"""Inputs at the edge of what is a mesh: a valid result, or a refusal that says what is wrong."""
+"""Extreme inputs: a valid result, or an error that names the problem."""
 
 import warnings
 
@@ -93,7 +93,7 @@ VALID = {
 
 @pytest.mark.slow
 @pytest.mark.parametrize("name", VALID)
-def test_a_valid_mesh_comes_out(name):
+def test_the_result_is_a_valid_mesh(name):
     make, n = VALID[name]
     with warnings.catch_warnings():
         warnings.simplefilter("error")  # nothing from a library reaches the user
@@ -122,7 +122,7 @@ def test_a_valid_mesh_comes_out(name):
         ({"ratio": 1e9}, "GiB of memory"),
     ],
 )
-def test_a_number_of_vertices_that_cannot_be_is_refused(options, said):
+def test_impossible_numbers_of_vertices_are_refused(options, said):
     with pytest.raises(OptionError, match=said):
         anisomesh.remesh(BALL, **options)
 

@@ -1,4 +1,4 @@
-"""What is asked for is what comes: the exact count, the largest error, the edges named, the time limit."""
+"""Targets of a remesh: exact vertex count, maximum error, tagged edges, time limit."""
 
 import json
 
@@ -37,7 +37,7 @@ def test_the_count_is_exact(name, n):
     assert not result.warnings
 
 
-def test_sites_at_the_same_place_are_made_up_for():
+def test_coinciding_sites_do_not_lower_the_count():
     """Regression: sites that coincide have no cell of their own, and the result had fewer vertices than asked."""
     surface = Surface([[0, 0, 0], [1, 0, 0], [1, 1, 0], [0, 1, 0]], [[0, 1, 2], [0, 2, 3]])
     for n in (4, 5, 6, 7, 30):
@@ -47,7 +47,7 @@ def test_sites_at_the_same_place_are_made_up_for():
 @pytest.mark.slow
 @pytest.mark.parametrize("share", [0.01, 0.002])
 @pytest.mark.parametrize("shape", [ellipsoid((2.0, 1.0, 0.5), 4), cad_part(8)], ids=["ellipsoid", "part"])
-def test_a_result_is_within_the_error_asked_for(shape, share):
+def test_a_result_is_within_the_requested_error(shape, share):
     asked = share * shape.diagonal
     result = anisomesh.remesh(shape, max_error=asked, max_iterations=20)
     measured = surface_distance(shape, result.surface, 30_000, seed=5).hausdorff
@@ -65,7 +65,7 @@ def test_an_error_out_of_reach_is_refused():
 
 
 @pytest.mark.parametrize("wrong", [0.0, -1.0, float("nan"), float("inf")])
-def test_errors_that_are_no_lengths_are_refused(wrong):
+def test_errors_that_are_not_positive_lengths_are_refused(wrong):
     with pytest.raises(OptionError, match="positive length"):
         anisomesh.remesh(sphere(1), max_error=wrong)
 
@@ -146,7 +146,7 @@ def test_the_command_searches_for_a_count(run_cli, tmp_path, torus_obj, text):
 
 
 @pytest.mark.parametrize("text", ["0", "-1", "x", "%", "nan"])
-def test_lengths_that_are_none_are_refused(run_cli, tmp_path, torus_obj, text):
+def test_invalid_lengths_are_refused(run_cli, tmp_path, torus_obj, text):
     done = run_cli("remesh", torus_obj, "-o", tmp_path / "out.ply", f"--max-error={text}")
     assert done.returncode == 2
     assert len(done.stderr.strip().splitlines()) == 1

@@ -1,4 +1,4 @@
-"""What is written is read back: exactly, or rounded to float32 where the format says so."""
+"""Written meshes are read back exactly, or rounded to float32 where the format does so."""
 
 import io
 import struct

@@ -1,4 +1,4 @@
-"""Subdivision changes the triangles and nothing else."""
+"""Subdivision changes the triangles but not the surface."""
 
 import numpy as np
 import pytest
@@ -87,7 +87,7 @@ def test_scalars_and_tensors_are_interpolated():
     np.testing.assert_allclose(refined.interpolate(tensors)[:, 1, 2], 5 * refined.interpolate(linear), atol=1e-12)
 
 
-def test_short_edges_are_left_alone_and_long_ones_go_first():
+def test_short_edges_are_kept_and_the_longest_are_split_first():
     parent = CLOSED["box"]
     assert split_long_edges(parent, 10.0, max_faces=12).surface.n_faces == parent.n_faces
     limited = split_long_edges(parent, 0.05, max_faces=14)

@@ -127,7 +127,7 @@ def test_face_tables_agree_with_the_faces(faces):
 
 
 @pytest.mark.parametrize("n_more", [0, 7])
-def test_unused_points_are_no_components(n_more):
+def test_unused_points_are_not_counted_as_components(n_more):
     faces = np.array([[0, 1, 2], [4, 5, 6]], dtype=np.int32)
     count, label = topology.connected_components(faces, 7 + n_more)
     assert count == 2

@@ -91,7 +91,7 @@ def test_no_single_flip_is_better_than_the_result_on_a_plane(seed):
             assert gain <= 1e-3
 
 
-def test_flips_in_a_metric_are_those_of_the_mapped_plane():
+def test_flips_in_a_metric_match_flips_in_the_mapped_plane():
     surface = jittered_plane(5)
     root = np.diag([1.0, 3.0, 1.0])
     mapped = surface.with_points(surface.points @ root)

@@ -1,4 +1,4 @@
-"""Intersecting triangles are taken apart where the surface has no intersection, and left where it has."""
+"""Self-intersections are removed, except where the surface itself intersects."""
 
 import numpy as np
 import pytest

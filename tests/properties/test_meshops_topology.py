@@ -1,4 +1,4 @@
-"""Collapses, splits and untangling keep the topology and do what they are for."""
+"""Edge collapses, edge splits and untangling keep the topology and reach their goals."""
 
 import numpy as np
 import pytest
@@ -82,7 +82,7 @@ def test_link_condition_against_sets():
 
 @pytest.mark.parametrize("name", SHAPES)
 @pytest.mark.parametrize("seed", range(3))
-def test_folded_triangles_are_turned_back(name, seed):
+def test_folded_triangles_are_untangled(name, seed):
     surface = SHAPES[name]
     rng = np.random.default_rng(seed)
     points = np.array(surface.points)
@@ -98,7 +98,7 @@ def test_folded_triangles_are_turned_back(name, seed):
     assert_same_topology(mended, surface)
 
 
-def test_a_good_mesh_is_left_alone():
+def test_a_mesh_without_inverted_triangles_is_returned_unchanged():
     surface = SHAPES["part"]
     points, faces, left = untangle(surface.points, surface.faces, ClosestPoints(surface))
     assert left == 0
@@ -106,7 +106,7 @@ def test_a_good_mesh_is_left_alone():
     assert faces is surface.faces
 
 
-def test_a_triangle_nearest_to_another_sheet_is_turned_back():
+def test_a_triangle_nearest_to_another_sheet_is_untangled():
     # two sheets that cross: near the line where they meet a triangle of one can be nearest to the other
     n = 12
     sheet = open_patch(lambda x, y: 0.0 * x, n=n)
@@ -125,7 +125,7 @@ def test_a_triangle_nearest_to_another_sheet_is_turned_back():
     assert len(points) < 1.3 * mesh.n_points
 
 
-def test_decimation_of_a_square_tube_leaves_no_needle_and_no_turned_face():
+def test_decimation_of_a_square_tube_leaves_no_needle_and_no_inverted_face():
     # a thin tube with many bends: what collapses is often flat, or half way between two walls
     steps = np.array([[1, 0, 0], [0, 1, 0], [0, 0, 1], [0, 1, 0], [1, 0, 0], [0, 0, -1]] * 4)
     path = np.cumsum(np.repeat(steps, 2, axis=0), axis=0)

@@ -1,4 +1,4 @@
-"""The metric turns with the surface."""
+"""The metric rotates with the surface."""
 
 import numpy as np
 import pytest

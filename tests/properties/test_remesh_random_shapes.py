@@ -1,4 +1,4 @@
-"""The promise of a valid mesh, on random shapes that are hard to keep it for, and any number of vertices."""
+"""Valid meshes from random difficult shapes, at any number of vertices."""
 
 import hypothesis
 import numpy as np
@@ -17,7 +17,7 @@ pytestmark = pytest.mark.slow
 @pytest.mark.parametrize("make", SHAPES)
 @examples(8)
 @hypothesis.given(seed=st.integers(0, 2**32 - 1), size=st.floats(0.7, 2.6))
-def test_topology_holds_and_what_is_left_is_said(make, seed, size):
+def test_topology_holds_and_remaining_faults_are_reported(make, seed, size):
     surface = make(np.random.default_rng(seed))
     n = max(4, round(10**size))
     result = remesh(surface, n_vertices=n, seed=seed, max_iterations=15)

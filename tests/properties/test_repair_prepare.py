@@ -263,7 +263,7 @@ def test_needle_on_a_closed_surface_is_collapsed():
     assert volume(prepared.surface) == pytest.approx(1 / 6)
 
 
-def test_flap_on_a_closed_surface_goes_away():
+def test_flap_on_a_closed_surface_is_removed():
     points = np.vstack([np.vstack([np.zeros(3), np.eye(3)]), [-1, -1, -1]])
     flap = Surface(points, np.vstack([TETRAHEDRON, [[0, 1, 4], [1, 0, 4]]]))
     prepared = prepare(flap)
@@ -273,7 +273,7 @@ def test_flap_on_a_closed_surface_goes_away():
 
 
 @pytest.mark.parametrize("other", [[1, 0, 4], [0, 1, 4]])
-def test_flap_without_area_goes_away(other):
+def test_flap_without_area_is_removed(other):
     points = np.vstack([np.zeros(3), np.eye(3), [0.25, 0, 0]])
     flap = Surface(points, np.vstack([TETRAHEDRON, [[0, 1, 4], other]]))
     prepared = prepare(flap)

@@ -1,4 +1,4 @@
-"""Suites: the shipped ones are right, errors in a file say where and what was meant."""
+"""Suites: the suites of the package are consistent; errors in a file name the place and a correction."""
 
 import pytest
 
@@ -13,7 +13,7 @@ TABLE = {"shapes": ["sphere:100"], "methods": [{"name": "ours", "method": "aniso
 
 
 @pytest.mark.parametrize("name", suite_names())
-def test_shipped_suites_load_and_their_shapes_and_options_exist(name):
+def test_suites_of_the_package_load_and_their_shapes_and_options_exist(name):
     suite = load_suite(name)
     assert suite.name == name
     assert suite.description
@@ -30,7 +30,7 @@ def test_all_suites_of_the_paper_are_there():
     assert set(suite_names()) >= plain | set(LEARNING)
 
 
-def test_networks_that_shipped_suites_name_come_with_the_package():
+def test_networks_named_by_suites_come_with_the_package():
     named = {
         method.options["weights"]
         for name in suite_names()
@@ -42,7 +42,7 @@ def test_networks_that_shipped_suites_name_come_with_the_package():
 
 
 @pytest.mark.parametrize("name", LEARNING)
-def test_networks_of_shipped_suites_can_be_trained(name):
+def test_networks_of_suites_can_be_trained(name):
     pytest.importorskip("torch")
     from anisomesh.learn.training.config import parse_training
 
@@ -81,7 +81,7 @@ def test_unknown_and_malformed_files(tmp_path):
         load_suite(str(tmp_path / "bad.toml"))
 
 
-def test_meshes_that_are_not_there_are_named(tmp_path):
+def test_missing_meshes_are_named(tmp_path):
     suite = parse_suite("mine", {**TABLE, "meshes": ["test/*.ply"]})
     with pytest.raises(OptionError, match=r"needs the meshes test/\*\.ply; name their folder"):
         inputs_of(suite, None)
@@ -96,7 +96,7 @@ def test_wrong_shapes_are_refused(spec):
 
 
 @pytest.mark.parametrize("spec", ["sphere:1000", "ring:2000", "part:3000"])
-def test_shapes_have_about_the_size_asked_for(spec):
+def test_shapes_have_about_the_requested_size(spec):
     wanted = float(spec.split(":")[1])
     assert 0.4 * wanted < make_shape(spec).n_points < 2.5 * wanted
 

@@ -23,7 +23,7 @@ def test_built_in_metric_sources_conform(source):
         (lambda n: np.full((n, 3, 3), np.nan), "not finite"),
     ],
 )
-def test_tensors_that_are_no_metric_are_found(tensors, message):
+def test_tensors_that_are_not_a_metric_are_found(tensors, message):
     with pytest.raises(MetricError, match=message):
         anisomesh.check_metric_source(lambda surface: MetricField(tensors=tensors(surface.n_points)))
 

@@ -1,4 +1,4 @@
-"""Embeddings that are given, and their metric."""
+"""Precomputed embeddings and their metric."""
 
 import numpy as np
 import pytest

@@ -37,7 +37,7 @@ def test_spheres_at_a_distance():
     assert measures.normal_consistency == pytest.approx(1.0, abs=1e-3)
 
 
-def test_a_cube_turned_onto_itself_is_at_the_floor_and_at_45_degrees_is_not():
+def test_a_cube_rotated_onto_itself_is_at_the_floor_and_at_45_degrees_is_not():
     cube = unit(box(n=2))
     turned = {
         angle: cube.with_points(Rotation.from_euler("z", angle, degrees=True).apply(np.array(cube.points)))
@@ -71,7 +71,7 @@ def test_surfaces_without_creases_have_stated_results():
         assert (one.edge_chamfer, one.edge_f1, one.edge_f1_wide) == (None, 0.0, 0.0)
 
 
-def test_the_same_seed_gives_the_same_figures_and_one_sample_is_enough():
+def test_the_same_seed_gives_the_same_measures_and_one_sample_is_enough():
     cube = box(n=1)
     assert sampled_measures(cube, cube, samples=500) == sampled_measures(cube, cube, samples=500)
     assert sampled_measures(cube, cube, samples=500, seed=1) != sampled_measures(cube, cube, samples=500)

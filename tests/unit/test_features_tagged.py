@@ -1,4 +1,4 @@
-"""Edges named by the user: found again after repair and on the split surface, wrong ones refused."""
+"""Edges tagged by the user: mapped through repair and subdivision; invalid edges are refused."""
 
 import numpy as np
 import pytest
@@ -79,7 +79,7 @@ def test_pieces_of_a_split_edge_are_those_that_lie_in_it(length):
         ([[3, 3]], "not edges"),
     ],
 )
-def test_pairs_that_are_no_edges_are_refused(pairs, words):
+def test_pairs_that_name_no_edge_are_refused(pairs, words):
     surface = grid()
     with pytest.raises(OptionError, match=words):
         tagged_edges(surface, pairs, surface, 0.0)

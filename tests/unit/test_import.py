@@ -1,4 +1,4 @@
-"""The package imports at once, and its public names are what they say."""
+"""Importing loads nothing heavy; public names resolve to their definitions."""
 
 import json
 import subprocess

@@ -1,4 +1,4 @@
-"""Particular files, good and bad, and what writing leaves behind."""
+"""Particular valid and invalid files, and the files that writing leaves behind."""
 
 import logging
 import struct
@@ -114,7 +114,7 @@ def test_missing_file_and_folder(tmp_path, suffix):
 
 
 @pytest.mark.parametrize("suffix", [".vtu", ".msh", ".mesh"])
-def test_volume_cells_alone_are_no_surface(tmp_path, capfd, suffix):
+def test_volume_cells_alone_are_refused(tmp_path, capfd, suffix):
     path = tmp_path / f"volume{suffix}"
     formats = {".vtu": "vtu", ".msh": "gmsh22", ".mesh": "medit"}
     VOLUME_MESH.write(path, file_format=formats[suffix])

@@ -1,4 +1,4 @@
-"""Calls in another process: results and errors come back, and so does the news of a crash."""
+"""Calls in another process: results, errors and crashes are reported to the caller."""
 
 import math
 import os

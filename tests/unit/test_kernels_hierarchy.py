@@ -90,7 +90,7 @@ def test_fit_is_the_one_of_ridge_regression(graph):
         np.testing.assert_allclose(imbalance[i], np.linalg.norm(turns[rows].mean(axis=0)))
 
 
-def test_values_of_edges_are_those_of_whole_arrays(graph):
+def test_edge_features_match_whole_array_formulas(graph):
     rng = np.random.default_rng(6)
     n, i, j = len(graph.neighbour), graph.node, graph.neighbour
     values, turns, duals = rng.uniform(0.5, 2.0, (n, 4)), rng.normal(size=(n, 2, 2)), rng.normal(size=(n, 3))

@@ -43,7 +43,7 @@ def shaken(surface, seed=0):
 
 
 @pytest.mark.parametrize("seed", range(3))
-def test_largest_messages_are_those_of_brute_force(seed):
+def test_largest_messages_match_brute_force(seed):
     graph = random_graph(seed=seed)
     sent, weight = torch.randn(40, 7), torch.randn(3, 7)
     found = max_aggregation(sent, weight, graph)
@@ -55,7 +55,7 @@ def test_largest_messages_are_those_of_brute_force(seed):
     torch.testing.assert_close(found, max_by_scatter(sent, weight, graph))
 
 
-def test_derivatives_of_the_kernel_are_those_of_plain_torch():
+def test_derivatives_of_the_kernel_match_plain_torch():
     graph = random_graph(seed=4)
     sent, weight = torch.randn(40, 7, requires_grad=True), torch.randn(3, 7, requires_grad=True)
     along = torch.randn(graph.features.shape, requires_grad=True)
@@ -68,7 +68,7 @@ def test_derivatives_of_the_kernel_are_those_of_plain_torch():
 
 
 @pytest.mark.parametrize("channels", [1, 6, 64])
-def test_distances_of_values_and_their_derivatives_are_those_of_plain_torch(channels):
+def test_distances_of_values_and_their_derivatives_match_plain_torch(channels):
     torch.manual_seed(0)
     graph = random_graph(seed=channels)
     values = torch.randn(40, channels)
@@ -86,7 +86,7 @@ def test_distances_of_values_and_their_derivatives_are_those_of_plain_torch(chan
 
 
 @pytest.mark.parametrize("seed", range(3))
-def test_mean_messages_and_their_derivatives_are_those_of_brute_force_and_plain_torch(seed):
+def test_mean_messages_and_their_derivatives_match_brute_force_and_plain_torch(seed):
     graph = random_graph(seed=seed)
     own, sent, weight = torch.randn(40, 7), torch.randn(40, 7), torch.randn(3, 7)
     found = mean_aggregation(own, sent, weight, graph, 0.1)

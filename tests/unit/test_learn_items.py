@@ -66,7 +66,7 @@ def test_damaged_files_are_refused(tmp_path, damage):
 
 
 @pytest.mark.slow
-def test_a_given_mesh_is_an_item_with_the_metric_measured_on_it():
+def test_an_input_mesh_becomes_an_item_with_the_metric_measured_on_it():
     surface = ellipsoid((1.0, 0.5, 0.3), 4)  # 2,562 points
     recipe = Recipe(target=1_500, variants=("given",))
     made = items_of_mesh(surface, recipe, np.random.default_rng(0), remesh)
@@ -82,7 +82,7 @@ def test_a_given_mesh_is_an_item_with_the_metric_measured_on_it():
 
 @pytest.mark.slow
 @pytest.mark.parametrize("reason", ["needles", "many points", "even as it is"])
-def test_a_given_mesh_is_no_item_if_nothing_is_to_be_learnt_from_it(reason):
+def test_an_input_mesh_that_teaches_nothing_becomes_no_item(reason):
     surface = ellipsoid((1.0, 0.5, 0.3), 3)
     recipe = Recipe(target=100 if reason == "many points" else 600, variants=("given",))
     if reason == "needles":
@@ -121,7 +121,7 @@ def test_variants_have_the_metric_of_the_clean_mesh_not_their_own(made):
 
 
 @pytest.mark.slow
-def test_items_of_shapes_by_code_have_exact_curvature_at_every_point():
+def test_items_of_implicit_shapes_have_exact_curvature_at_every_point():
     blobs = Blobs.random(np.random.default_rng(3))
     made = items_of_blobs(blobs, RECIPE, np.random.default_rng(0), remesh)
     assert [entry.kind for entry in made] == ["even", "decimated", "stretched"]
@@ -143,7 +143,7 @@ def test_round_and_flat_shapes_are_unsuitable():
 
 
 @pytest.mark.slow
-def test_an_even_mesh_of_the_right_size_is_left_alone_and_others_are_not():
+def test_only_uneven_meshes_and_wrong_sizes_are_remeshed():
     good = sphere(3)
     assert even_mesh(good, Recipe(target=600), remesh) is good
     for recipe, mesh in (
@@ -165,7 +165,7 @@ def test_the_same_seed_gives_the_same_items(made):
 
 
 @pytest.mark.parametrize("wrong", [{"target": 10}, {"variants": ("melted",)}, {"evening": "iron"}])
-def test_recipes_that_cannot_be_are_refused(wrong):
+def test_invalid_recipes_are_refused(wrong):
     with pytest.raises(OptionError):
         Recipe(**wrong)
 
@@ -181,7 +181,7 @@ def test_evening_with_tetwild_keeps_the_shape_and_which_side_is_out(surface):
     assert volumes[0] == pytest.approx(volumes[1], rel=0.05)  # negative if turned inside out
 
 
-def test_evening_with_a_package_that_is_not_there_names_it(monkeypatch):
+def test_evening_with_a_missing_package_names_it(monkeypatch):
     monkeypatch.setattr("importlib.util.find_spec", lambda name: None)
     with pytest.raises(OptionError, match="pip install pytetwild"):
         even_mesh(sphere(1), Recipe(target=600, evening="tetwild"), remesh)

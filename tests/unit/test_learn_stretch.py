@@ -78,7 +78,7 @@ def test_lines_come_back_from_tensors_and_tensors_from_lines(seed):
     )
 
 
-def test_a_metric_that_is_the_same_all_around_has_no_line_however_large():
+def test_an_isotropic_metric_has_no_line_at_any_scale():
     normals = np.random.default_rng(0).normal(size=(20, 3))
     normals /= np.linalg.norm(normals, axis=1, keepdims=True)
     across = normals[:, :, None] * normals[:, None, :]
@@ -95,7 +95,7 @@ def test_the_loss_is_zero_for_the_answer_and_a_distance_elsewhere():
 
 
 @pytest.mark.parametrize("surface", [sphere(3), torus(n_major=40, n_minor=16)])
-def test_values_of_nodes_and_edges_are_those_of_the_shape(surface):
+def test_features_of_nodes_and_edges_match_the_shape(surface):
     surface = surface.with_points(surface.points / surface.diagonal)
     finest = graph_hierarchy(surface, 3).levels[0]
     assert finest.nodes.shape == (surface.n_points, N_NODE_FEATURES)
@@ -146,7 +146,7 @@ def plain_block(block, x, graph):
 
 
 @pytest.mark.parametrize("n_nodes", [1, 2, 600])
-def test_a_block_and_its_derivatives_are_those_of_the_plain_formulas(n_nodes):
+def test_a_block_and_its_derivatives_match_the_plain_formulas(n_nodes):
     torch.manual_seed(0)
     graph = graph_hierarchy(shaken(torus(n_major=40, n_minor=15)), 1).levels[0].graph
     if n_nodes < 3:

@@ -124,7 +124,7 @@ def shrink(points):
 
 @examples(60)
 @given(soups())
-def test_pairs_on_a_grid_are_those_of_rational_arithmetic(soup):
+def test_pairs_on_a_grid_match_exact_arithmetic(soup):
     assert self_intersections(soup).tolist() == naive_pairs(soup)
 
 

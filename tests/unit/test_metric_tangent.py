@@ -20,7 +20,7 @@ def smallest_rotation(start, end):
     return Rotation.from_rotvec(axis / length * np.arctan2(length, start @ end)).as_matrix()
 
 
-def test_averages_are_those_of_the_rotated_neighbours():
+def test_averages_match_sums_over_rotated_neighbours():
     rng = np.random.default_rng(0)
     normals = unit_normals(SURFACE)
     frames = tangent_frames(normals)

@@ -1,4 +1,4 @@
-"""Topology of the made shapes, and the creases of the machine part."""
+"""Topology of the procedural shapes, and the creases of the machine part."""
 
 import numpy as np
 import pytest

@@ -1,4 +1,4 @@
-"""Parts made by code: volume and area from formulas, closed and oriented outwards, outlines that are refused."""
+"""Procedural parts: volume and area from formulas, closed and oriented outwards, outlines that are refused."""
 
 import numpy as np
 import pytest

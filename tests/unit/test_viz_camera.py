@@ -1,4 +1,4 @@
-"""The camera looks from where it is told, with the right side up, at everything."""
+"""The camera looks from the given direction, upright, at the whole model."""
 
 import numpy as np
 import pytest

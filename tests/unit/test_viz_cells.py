@@ -1,4 +1,4 @@
-"""The lines around Voronoi cells are closed and lie between different cells."""
+"""The outlines of Voronoi cells are closed and lie between different cells."""
 
 import numpy as np
 import pytest

@@ -1,4 +1,4 @@
-"""Colours say what their name promises, in the units that they promise."""
+"""Colour values match their names and units."""
 
 import numpy as np
 import pytest

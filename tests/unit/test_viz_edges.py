@@ -1,4 +1,4 @@
-"""Edges are as dark as the triangles are large on the screen, and left out where they would be all there is."""
+"""Edges fade as triangles get smaller on the screen, and disappear where they would cover everything."""
 
 from itertools import pairwise
 
