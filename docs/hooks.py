@@ -21,10 +21,13 @@ ROOT = Path(__file__).parents[1]
 SOURCE = ROOT / "src" / "anisomesh"
 CACHE = ROOT / ".cache" / "examples"
 NOT_DOCUMENTED = ("_kernels", "cli")
+ONLINE_SHIM = "https://unpkg.com/iframe-worker/shim"  # the theme loads it to search in pages opened from disk
 EXAMPLE = re.compile(r"^```example\n(?P<name>\S+)\n```$", re.MULTILINE)
+NAMES = re.compile(r"^```names\n(?P<names>[\w\s]+)\n```$", re.MULTILINE)
 INLINE_MATH = re.compile(r'<span class="arithmatex">\\\((.*?)\\\)</span>', re.DOTALL)
 BLOCK_MATH = re.compile(r'<div class="arithmatex">\s*\\\[(.*?)\\\]\s*</div>', re.DOTALL)
 ROLE = re.compile(r":(?:class|func|meth|attr|data|mod):<code>(~?)([\w.]+)</code>")
+BAR = re.compile(r"<mo[^>]*>(?=(?:&#x0007C;|\|)<)")
 ENTITIES = {"&lt;": "<", "&gt;": ">", "&amp;": "&"}
 
 log = logging.getLogger("mkdocs.plugins.anisomesh")
@@ -45,9 +48,11 @@ def on_files(files: Any, config: Any) -> Any:
 
 def on_page_markdown(markdown: str, page: Any, config: Any, files: Any) -> str:
     """Put the source, the output and the pictures of an example where a page asks for it."""
-    for placeholder, text in (("{{ layers }}", layers), ("{{ public_names }}", public_names)):
-        if placeholder in markdown:
-            markdown = markdown.replace(placeholder, text())
+    if "{{ layers }}" in markdown:
+        markdown = markdown.replace("{{ layers }}", layers())
+    if NAMES.search(markdown):
+        check_public_names({name for found in NAMES.findall(markdown) for name in found.split()})
+        markdown = NAMES.sub(lambda match: "\n\n".join(map(public_name, match["names"].split())), markdown)
     up = "../" * page.file.src_uri.count("/")
     return EXAMPLE.sub(lambda match: shown(match["name"], up), markdown)
 
@@ -59,11 +64,17 @@ def on_page_content(html: str, page: Any, config: Any, files: Any) -> str:
     return ROLE.sub(link, html)
 
 
+def on_post_page(output: str, page: Any, config: Any) -> str:
+    """Load the script for search in pages opened from disk from the site itself."""
+    return output.replace(ONLINE_SHIM, "../" * page.file.src_uri.count("/") + "assets/iframe-worker.js")
+
+
 def mathml(formula: str, display: str) -> str:
     """Return a LaTeX formula, as it stands in HTML, as MathML, which browsers show without a script or a font."""
     for entity, character in ENTITIES.items():
         formula = formula.replace(entity, character)
     converted = latex2mathml.converter.convert(formula, display=display)
+    converted = BAR.sub(r'<mo stretchy="false" lspace="0" rspace="0">', converted)
     return f'<div class="formula">{converted}</div>' if display == "block" else converted
 
 
@@ -126,12 +137,20 @@ def layers() -> str:
     return "```text\n" + "\n".join(contract["layers"]) + "\n```"
 
 
-def public_names() -> str:
-    """Return a section for each name that ``import anisomesh`` offers."""
+def check_public_names(documented: set[str]) -> None:
+    """Refuse a page of public names that has others than ``import anisomesh`` offers."""
     import anisomesh
 
-    names = sorted((name for name in anisomesh.__all__ if not name.startswith("_")), key=str.lower)
-    return "\n\n".join(f"## {name}\n\n::: anisomesh.{name}" for name in names)
+    public = {name for name in anisomesh.__all__ if not name.startswith("_")}
+    if documented != public:
+        raise PluginError(f"docs/reference/api/index.md: missing or unknown: {', '.join(sorted(documented ^ public))}")
+
+
+def public_name(name: str) -> str:
+    """Return the documentation of a name that ``import anisomesh`` offers."""
+    return (
+        f"::: anisomesh.{name}\n    options: {{show_root_heading: true, show_root_toc_entry: true, heading_level: 3}}"
+    )
 
 
 def packages() -> list[str]:
