@@ -119,7 +119,7 @@ def test_methods_get_disturbed_meshes_and_are_compared_with_the_clean_one(tmp_pa
         given[len(given)] = surface
         return methods.MethodResult(surface, {})
 
-    monkeypatch.setitem(methods.METHODS, "acvd", methods.Remesher(unchanged))
+    monkeypatch.setitem(methods.METHODS, "acvd", methods.Method(unchanged))
     inputs = ["clean", "noise 0.1", "noise 0.3", "stretched"]
     three = suite(shapes=["sphere:640"], inputs=inputs, methods=[{"name": "none", "method": "acvd"}])
     rows = run_suite(three, tmp_path / "rows")
@@ -153,8 +153,8 @@ def test_failures_and_missing_packages_are_rows(tmp_path, monkeypatch):
     def broken(surface, n, seed, options):
         raise ZeroDivisionError("no luck")
 
-    monkeypatch.setitem(methods.METHODS, "acvd", methods.Remesher(broken))
-    monkeypatch.setitem(methods.METHODS, "pymeshlab-quadric", methods.Remesher(broken, ("no_such_package",)))
+    monkeypatch.setitem(methods.METHODS, "acvd", methods.Method(broken))
+    monkeypatch.setitem(methods.METHODS, "pymeshlab-quadric", methods.Method(broken, ("no_such_package",)))
     three = suite(methods=[OURS, {"name": "broken", "method": "acvd"}, {"name": "away", "method": "pymeshlab-quadric"}])
     rows = run_suite(three, tmp_path / "rows")
     assert [row["status"] for row in rows] == ["done", "failed", "absent"]

@@ -31,8 +31,8 @@ class MethodResult(NamedTuple):
 
 
 @dataclass(frozen=True)
-class Remesher:
-    """A function (surface, n_vertices, seed, options) -> result, and the packages that it needs."""
+class Method:
+    """A method of the benchmarks: a function (surface, n_vertices, seed, options) -> result, and its packages."""
 
     run: Callable[[Surface, int, int, dict[str, Any]], MethodResult]
     packages: tuple[str, ...] = ()
@@ -150,13 +150,13 @@ def _between(size: float, tried: list[tuple[float, int, Any]], n: int) -> float:
 
 
 METHODS = {
-    "anisomesh": Remesher(_anisomesh),
-    "vtk-quadric": Remesher(_vtk_quadric, ("pyvista",)),
-    "fast-simplification": Remesher(_fast_simplification, ("fast_simplification",)),
-    "acvd": Remesher(_acvd, ("pyacvd", "pyvista")),
-    "pymeshlab-quadric": Remesher(_pymeshlab, ("pymeshlab",), isolated=True),
-    "mmg": Remesher(_mmg, ("mmgpy",), isolated=True),
-    "mmg-metric": Remesher(_mmg_with_metric, ("mmgpy",), isolated=True),
+    "anisomesh": Method(_anisomesh),
+    "vtk-quadric": Method(_vtk_quadric, ("pyvista",)),
+    "fast-simplification": Method(_fast_simplification, ("fast_simplification",)),
+    "acvd": Method(_acvd, ("pyacvd", "pyvista")),
+    "pymeshlab-quadric": Method(_pymeshlab, ("pymeshlab",), isolated=True),
+    "mmg": Method(_mmg, ("mmgpy",), isolated=True),
+    "mmg-metric": Method(_mmg_with_metric, ("mmgpy",), isolated=True),
 }
 """All methods by name. The options in a suite are passed to the function of the library."""
 
