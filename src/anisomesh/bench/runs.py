@@ -15,7 +15,7 @@ import numpy as np
 from anisomesh.bench.disturb import CLEAN, disturbed
 from anisomesh.bench.inputs import Input, inputs_of
 from anisomesh.bench.methods import METHODS, MethodResult
-from anisomesh.bench.suite import Method, Suite
+from anisomesh.bench.suite import Suite, SuiteMethod
 from anisomesh.bench.training import train_networks
 from anisomesh.errors import AnisomeshError
 from anisomesh.evaluation.report import evaluate
@@ -137,7 +137,7 @@ class _Job:
     mesh: Input
     input_name: str
     ratio: float
-    method: Method
+    method: SuiteMethod
     seed: int
 
     @property

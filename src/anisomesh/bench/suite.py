@@ -17,7 +17,7 @@ _METHOD_KEYS = {"name", "method", "options", "training"}
 
 
 @dataclass(frozen=True, kw_only=True)
-class Method:
+class SuiteMethod:
     """A remesher with its options, a ``[[methods]]`` table of a suite.
 
     Attributes
@@ -77,7 +77,7 @@ class Suite:
     ratios: tuple[float, ...] = (1.0,)
     seeds: tuple[int, ...] = (0,)
     samples: int = 100_000
-    methods: tuple[Method, ...]
+    methods: tuple[SuiteMethod, ...]
 
     def __post_init__(self) -> None:
         if not min(self.ratios) > 0.0 or self.samples < 1:
@@ -137,7 +137,7 @@ def parse_suite(name: str, table: dict[str, Any]) -> Suite:
     return suite
 
 
-def _method(suite: str, entry: dict[str, Any]) -> Method:
+def _method(suite: str, entry: dict[str, Any]) -> SuiteMethod:
     check_keys(f"{suite}: method {entry.get('name', '?')!r}", entry, _METHOD_KEYS)
     method = entry.get("method", "")
     if method not in METHODS:
@@ -147,7 +147,7 @@ def _method(suite: str, entry: dict[str, Any]) -> Method:
     options, training = dict(entry.get("options", {})), entry.get("training")
     if training is not None and not isinstance(training, dict):
         raise OptionError(f"{suite}: training = {training!r}; expected a table")
-    return Method(name=str(entry.get("name", method)), method=method, options=options, training=training)
+    return SuiteMethod(name=str(entry.get("name", method)), method=method, options=options, training=training)
 
 
 def _list(suite: str, table: dict[str, Any], key: str, kind: Any) -> list[Any]:

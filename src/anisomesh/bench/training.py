@@ -8,7 +8,7 @@ from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
 
-from anisomesh.bench.suite import Method, Suite
+from anisomesh.bench.suite import Suite, SuiteMethod
 from anisomesh.errors import OptionError
 from anisomesh.learn import require_torch
 
@@ -65,7 +65,7 @@ def train_networks(
     return found
 
 
-def _folder(method: Method) -> str:
+def _folder(method: SuiteMethod) -> str:
     """Return a folder name that depends on all settings of the training."""
     mark = hashlib.sha256(json.dumps([method.name, method.training], sort_keys=True).encode()).hexdigest()[:8]
     return "".join(letter if letter.isalnum() else "-" for letter in method.name) + "-" + mark
