@@ -1,6 +1,7 @@
 """The examples run and show what their text says."""
 
 import importlib.util
+import sys
 from pathlib import Path
 
 import numpy as np
@@ -10,8 +11,9 @@ FOLDER = Path(__file__).parents[2] / "examples"
 
 
 def example(name):
-    spec = importlib.util.spec_from_file_location(name, FOLDER / f"{name}.py")
+    spec = importlib.util.spec_from_file_location(f"example_{name}", FOLDER / f"{name}.py")
     module = importlib.util.module_from_spec(spec)
+    sys.modules[spec.name] = module  # where dataclasses look for names in annotations
     spec.loader.exec_module(module)
     return module
 
@@ -23,7 +25,9 @@ def stretch_along_z():
 
 
 def test_every_example_is_tested():
-    assert {path.stem for path in FOLDER.glob("*.py")} == {"remesh_a_surface", "own_metric", "gallery", "noisy_scan"}
+    tested = {"remesh_a_surface", "own_metric", "gallery", "noisy_scan"}
+    tutorials = {"own_metric_source", "own_energy", "own_embedder", "stages"}
+    assert {path.stem for path in FOLDER.glob("*.py")} == tested | tutorials
 
 
 def test_remesh_a_surface(tmp_path, capsys, torus_obj):
@@ -64,3 +68,39 @@ def test_noisy_scan_is_better_with_the_network(tmp_path, capsys):
     )
     assert hybrid[0] > direct[0] + 0.05  # G
     assert hybrid[1] < 0.8 * direct[1]  # RMS
+
+
+def test_own_metric_source_stretches_triangles_around_the_axis(tmp_path):
+    plain, around, curvature = example("own_metric_source").main(str(tmp_path / "source.png"), n_vertices=300)
+    assert plain.stretch.achieved_mean == pytest.approx(1.0, abs=1e-6)
+    assert around.stretch.achieved_mean > 3.0
+    assert curvature.embedding_name == "direct"
+    middle = around.surface.points[around.surface.edges].mean(axis=1)
+    edge = np.diff(around.surface.points[around.surface.edges], axis=1)[:, 0]
+    along = np.abs(edge[:, 1] * middle[:, 0] - edge[:, 0] * middle[:, 1]) / np.hypot(middle[:, 0], middle[:, 1])
+    assert along.mean() > 1.5 * np.sqrt((edge**2).sum(axis=1) - along**2).mean()
+    assert (tmp_path / "source.png").stat().st_size > 10_000
+
+
+def test_own_energy_makes_flat_triangles(tmp_path):
+    plain, layered = example("own_energy").main(str(tmp_path / "energy.png"), n_vertices=200)
+    heights = [np.abs(np.diff(r.surface.points[r.surface.edges], axis=1)[:, 0, 2]).mean() for r in (plain, layered)]
+    assert heights[1] < 0.8 * heights[0]
+    assert plain.validity.closed
+    assert layered.validity.closed
+    assert not layered.warnings
+
+
+def test_own_embedder_is_worse_in_the_metric_than_the_direct_one(tmp_path, capsys):
+    results = example("own_embedder").main(str(tmp_path / "embedder.png"), n_vertices=300)
+    assert [result.embedding.points.shape[1] for result in results] == [6, 6, 8]
+    quality = [float(line.split("G ")[1].split()[0]) for line in capsys.readouterr().out.splitlines()]
+    assert quality[2] == max(quality)
+
+
+def test_stages_make_a_valid_mesh_step_by_step(tmp_path, capsys):
+    result = example("stages").main(str(tmp_path / "stages.png"), n_vertices=300)
+    assert result.n_points == 300
+    words = [line.split(":")[0] for line in capsys.readouterr().out.splitlines()]
+    assert words == ["prepared", "metric", "embedding", "features", "sites", "mesh"]
+    assert (tmp_path / "stages.png").stat().st_size > 10_000

@@ -75,10 +75,18 @@ class Colouring:
         return ListedColormap(colormaps[self.colours](np.linspace(*self.part, 256)))
 
 
-def stretch_colouring(surface: Surface) -> Colouring:
-    """Colour triangles by their stretch, see :func:`~anisomesh.viz.view.triangle_stretch`."""
+def stretch_colouring(surface: Surface, *, high: float | None = None) -> Colouring:
+    """Colour triangles by their stretch, see :func:`~anisomesh.viz.view.triangle_stretch`.
+
+    Parameters
+    ----------
+    surface
+        The triangles.
+    high
+        Stretch of the last colour, to compare surfaces; if None, the 99 % quantile.
+    """
     values = triangle_stretch(surface)
-    return Colouring(values=values, name=f"stretch of the triangles, mean {_mean(values):.2f}", low=1.0)
+    return Colouring(values=values, name=f"stretch of the triangles, mean {_mean(values):.2f}", low=1.0, high=high)
 
 
 def quality_colouring(surface: Surface, reference: Surface) -> Colouring:
