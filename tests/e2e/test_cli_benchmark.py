@@ -32,6 +32,7 @@ def suite(**change):
     return parse_suite("mine", {"shapes": ["sphere:100"], "ratios": [0.5], "samples": 200, "methods": [OURS], **change})
 
 
+@pytest.mark.slow
 def test_command_writes_rows_and_reports_and_goes_on(run_cli, tmp_path):
     (tmp_path / "two.toml").write_text(TOML)
     first = run_cli("benchmark", tmp_path / "two.toml", "-o", tmp_path / "out")

@@ -15,6 +15,7 @@ def demo(run_cli, tmp_path_factory):
     return folder, process
 
 
+@pytest.mark.slow
 def test_demo_writes_meshes_report_and_picture_and_names_them(demo):
     folder, process = demo
     names = {"input.ply", "remeshed.ply", "report.json", "side_by_side.png"}
@@ -23,6 +24,7 @@ def test_demo_writes_meshes_report_and_picture_and_names_them(demo):
     assert (folder / "side_by_side.png").read_bytes().startswith(b"\x89PNG")
 
 
+@pytest.mark.slow
 def test_demo_result_has_the_topology_of_its_input(demo):
     folder, _ = demo
     before, after = (trimesh.load(folder / name, process=False, force="mesh") for name in ("input.ply", "remeshed.ply"))

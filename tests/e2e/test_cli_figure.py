@@ -84,6 +84,7 @@ def test_colour_is_on_the_result_and_its_bar_below_it(figure, colour):
     assert coloured(bar[:, :800]) == 0.0
 
 
+@pytest.mark.slow
 def test_remeshing_on_the_fly_can_show_the_cells(figure):
     image = pixels(figure("result", "fine.obj", "-n", 80, "--cells", "--colour", "distance", "--threads", 1))
     assert image.shape[1] == 2400
@@ -98,6 +99,7 @@ def test_the_summary_names_sizes_colour_and_file(drawing, meshes, tmp_path, run_
     assert all(part in done.stdout for part in ("512 vertices", "72 vertices", "stretch", str(out)))
 
 
+@pytest.mark.slow
 def test_a_pdf_is_one_page_with_text_and_the_same_each_time(figure):
     data = figure("result", "fine.obj", "coarse.obj", "--colour", "stretch", name="out.pdf").read_bytes()
     assert data.startswith(b"%PDF-")
@@ -149,6 +151,7 @@ def test_meshes_fill_their_panels_unless_the_camera_is_the_same(figure):
     assert breadth(same[:, :480]) < 0.5 * breadth(same[:, 480:])
 
 
+@pytest.mark.slow
 def test_a_strip_shows_fewer_and_fewer_triangles_from_the_same_side(figure):
     image = pixels(figure("strip", "fine.obj", "--ratios", 1, 0.5, 0.15, "--threads", 1))
     assert image.shape[1] == 3 * 480
@@ -157,6 +160,7 @@ def test_a_strip_shows_fewer_and_fewer_triangles_from_the_same_side(figure):
     assert 0.0 < (first != last).mean() < 0.1
 
 
+@pytest.mark.slow
 def test_ratios_may_be_one_word_and_stand_before_the_mesh(figure):
     first = figure("strip", "--ratios", "0.3,0.2", "fine.obj", "--threads", 1, name="a.png")
     second = figure("strip", "--ratios", 0.3, 0.2, "fine.obj", "--threads", 1, name="b.png")
@@ -209,6 +213,7 @@ def test_a_figure_without_a_kind_shows_the_kinds(run_cli):
     assert all(kind in done.stdout for kind in ("result", "gallery", "strip"))
 
 
+@pytest.mark.slow
 def test_the_picture_of_a_remesh_may_be_a_pdf(drawing, meshes, run_cli, tmp_path):
     words = ["remesh", meshes / "coarse.obj", "-o", tmp_path / "out.ply", "-n", 60, "--picture", tmp_path / "both.pdf"]
     assert run_cli(*words, "-q").returncode == 0

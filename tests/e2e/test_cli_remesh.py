@@ -89,6 +89,7 @@ def test_progress_goes_to_standard_error_in_plain_lines(run_with_everything):
     assert not any("\x1b" in line or "\r" in line for line in lines)
 
 
+@pytest.mark.slow
 def test_the_result_depends_on_the_seed_and_not_on_the_threads(run_cli, torus_obj, tmp_path):
     def points(name, *words):
         process = run_cli("remesh", torus_obj, "-o", tmp_path / name, "--ratio", 0.15, "--quiet", *words)

@@ -51,11 +51,13 @@ def test_the_direct_embedding_conforms_and_wrong_ones_are_found():
         anisomesh.check_embedder(lambda surface, field: replace(direct(surface, field), points=surface.points[:-1]))
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("energy", [NormalMetric(1.0), NormalMetric(7.0), anisomesh.energy_from_kernel(plain)])
 def test_energies_with_exact_gradients_conform(energy):
     assert anisomesh.check_energy_gradient(energy) < 1e-4
 
 
+@pytest.mark.slow
 def test_faults_of_energies_are_found():
     with pytest.raises(ConformanceError, match="off central differences"):
         anisomesh.check_energy_gradient(anisomesh.energy_from_kernel(without_site_gradient))
