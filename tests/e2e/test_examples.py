@@ -70,6 +70,7 @@ def test_noisy_scan_is_better_with_the_network(tmp_path, capsys):
     assert hybrid[1] < 0.8 * direct[1]  # RMS
 
 
+@pytest.mark.slow
 def test_own_metric_source_stretches_triangles_around_the_axis(tmp_path):
     plain, around, curvature = example("own_metric_source").main(str(tmp_path / "source.png"), n_vertices=300)
     assert plain.stretch.achieved_mean == pytest.approx(1.0, abs=1e-6)
@@ -82,6 +83,7 @@ def test_own_metric_source_stretches_triangles_around_the_axis(tmp_path):
     assert (tmp_path / "source.png").stat().st_size > 10_000
 
 
+@pytest.mark.slow
 def test_own_energy_makes_flat_triangles(tmp_path):
     plain, layered = example("own_energy").main(str(tmp_path / "energy.png"), n_vertices=200)
     heights = [np.abs(np.diff(r.surface.points[r.surface.edges], axis=1)[:, 0, 2]).mean() for r in (plain, layered)]
@@ -91,6 +93,7 @@ def test_own_energy_makes_flat_triangles(tmp_path):
     assert not layered.warnings
 
 
+@pytest.mark.slow
 def test_own_embedder_is_worse_in_the_metric_than_the_direct_one(tmp_path, capsys):
     results = example("own_embedder").main(str(tmp_path / "embedder.png"), n_vertices=300)
     assert [result.embedding.points.shape[1] for result in results] == [6, 6, 8]
