@@ -93,7 +93,8 @@ def weights(folder):
 def test_a_run_learns_and_writes_its_files(files, tmp_path):
     rows = train(options(tmp_path / "run", epochs=12, rate=1e-2), files)
     assert [row["epoch"] for row in rows] == list(range(1, 13))
-    assert rows[-1]["loss"] < 0.8 * rows[0]["loss"]
+    # an epoch is two steps with random noise, so a single one can be a spike
+    assert np.median([row["loss"] for row in rows[-4:]]) < 0.8 * rows[0]["loss"]
     lines = (tmp_path / "run" / METRICS).read_text().splitlines()
     assert [json.loads(line) for line in lines] == rows
     events = EventAccumulator(str(tmp_path / "run" / EVENTS)).Reload()
