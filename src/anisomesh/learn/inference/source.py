@@ -35,7 +35,7 @@ class Neural:
 
     References
     ----------
-    NASM, section 3.2; docs/learning.md for the default network.
+    NASM, section 3.2; docs/stages/network.md for the default network.
     """
 
     weights: str | os.PathLike[str] | None = None
