@@ -21,7 +21,6 @@ ROOT = Path(__file__).parents[1]
 SOURCE = ROOT / "src" / "anisomesh"
 CACHE = ROOT / ".cache" / "examples"
 NOT_DOCUMENTED = ("_kernels", "cli")
-ONLINE_SHIM = "https://unpkg.com/iframe-worker/shim"  # the theme loads it to search in pages opened from disk
 EXAMPLE = re.compile(r"^```example\n(?P<name>\S+)\n```$", re.MULTILINE)
 NAMES = re.compile(r"^```names\n(?P<names>[\w\s]+)\n```$", re.MULTILINE)
 INLINE_MATH = re.compile(r'<span class="arithmatex">\\\((.*?)\\\)</span>', re.DOTALL)
@@ -62,11 +61,6 @@ def on_page_content(html: str, page: Any, config: Any, files: Any) -> str:
     html = BLOCK_MATH.sub(lambda match: mathml(match[1], "block"), html)
     html = INLINE_MATH.sub(lambda match: mathml(match[1], "inline"), html)
     return ROLE.sub(link, html)
-
-
-def on_post_page(output: str, page: Any, config: Any) -> str:
-    """Load the script for search in pages opened from disk from the site itself."""
-    return output.replace(ONLINE_SHIM, "../" * page.file.src_uri.count("/") + "assets/iframe-worker.js")
 
 
 def mathml(formula: str, display: str) -> str:
