@@ -3,6 +3,7 @@
 import contextlib
 import io
 import itertools
+import json
 import os
 import subprocess
 import sys
@@ -144,6 +145,28 @@ def torus_obj(tmp_path_factory: pytest.TempPathFactory) -> Path:
 def large_torus_obj(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """An OBJ file with a torus of 20,000 points, enough to keep the optimiser busy for many seconds."""
     return write_obj(tmp_path_factory.mktemp("input") / "large.obj", *torus_arrays(200, 100))
+
+
+@pytest.fixture(scope="session")
+def item_folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """A small data set of two implicit shapes, one for training and one for validation."""
+    from anisomesh.learn.data.items import save_item
+    from anisomesh.learn.data.make import items_of_blobs
+    from anisomesh.learn.data.recipe import Recipe
+    from anisomesh.pipeline import remesh
+    from anisomesh.shapes.implicit import Blobs
+
+    folder, rows = tmp_path_factory.mktemp("items"), []
+    for seed, split in enumerate(("training", "validation")):
+        name, items = f"blobs-{seed}", []
+        shape = Blobs.random(np.random.default_rng(seed))
+        for entry in items_of_blobs(shape, Recipe(target=300), np.random.default_rng(seed), remesh):
+            items.append({"file": f"{name}.{entry.kind}.npz", "kind": entry.kind})
+            save_item(entry.item, folder / items[-1]["file"])
+        row = {"name": name, "family": str(seed), "split": split, "fingerprint": "", "status": "kept", "items": items}
+        rows.append(json.dumps(row) + "\n")
+    (folder / "manifest.jsonl").write_text("".join(rows))
+    return folder
 
 
 @pytest.fixture(scope="session")

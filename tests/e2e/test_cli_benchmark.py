@@ -18,13 +18,13 @@ from anisomesh.mesh.surface import Surface
 from anisomesh.shapes.analytic import box, open_patch, sphere
 from conftest import CLI
 
-OURS = {"name": "ours", "method": "anisomesh", "options": {"max_iterations": 3}}
+OURS = {"name": "ours", "method": "anisomesh", "options": {"max_iterations": 3, "embedding": "direct"}}
 TOML = """
 description = "two spheres"
 shapes = ["sphere:160", "sphere:640"]
 ratios = [0.5, 0.3]
 samples = 200
-methods = [{name = "ours", method = "anisomesh", options = {max_iterations = 3}}]
+methods = [{name = "ours", method = "anisomesh", options = {max_iterations = 3, embedding = "direct"}}]
 """
 
 
@@ -105,7 +105,7 @@ def test_other_options_are_run_again(tmp_path):
     steps = []
     run_suite(suite(), tmp_path / "rows", on_row=steps.append)
     assert not steps
-    changed = {**OURS, "options": {"max_iterations": 4}}
+    changed = {**OURS, "options": {**OURS["options"], "max_iterations": 4}}
     rows = run_suite(suite(methods=[changed]), tmp_path / "rows", on_row=steps.append)
     assert len(steps) == 1
     assert rows[0]["options"]["max_iterations"] == 4
@@ -226,14 +226,9 @@ def test_list_and_errors(run_cli, tmp_path):
 
 
 @pytest.mark.slow
-def test_a_suite_trains_the_networks_that_it_compares(tmp_path, run_cli):
+def test_a_suite_trains_the_networks_that_it_compares(tmp_path, item_folder):
     pytest.importorskip("torch")
-    from anisomesh.learn.data.build import build
-    from anisomesh.learn.data.recipe import Recipe
-    from anisomesh.learn.data.sources import sources_of
-    from anisomesh.pipeline import remesh
 
-    build(sources_of(None, 6, validation=0.4), tmp_path / "items", Recipe(target=200, variants=()), remesh)
     training = {"epochs": 2, "network": {"channels": 8, "scales": 2, "blocks": 1, "heads": 1}}
     paper = {"epochs": 1, "paper": {"channels": 8, "levels": 2}}
     neural = {"method": "anisomesh", "options": {"embedding": "neural", "max_iterations": 3}}
@@ -242,7 +237,7 @@ def test_a_suite_trains_the_networks_that_it_compares(tmp_path, run_cli):
     with pytest.raises(OptionError, match="name a data set with --items"):
         run_suite(wanted, tmp_path / "rows.jsonl")
     told, steps = [], []
-    rows = run_suite(wanted, tmp_path / "rows.jsonl", items=tmp_path / "items", on_epoch=told.append)
+    rows = run_suite(wanted, tmp_path / "rows.jsonl", items=item_folder, on_epoch=told.append)
     assert [row["status"] for row in rows] == ["done", "done"]
     assert [text.split(",")[0] for text in told] == [
         "ours 1: epoch 1 of 2",
@@ -255,9 +250,9 @@ def test_a_suite_trains_the_networks_that_it_compares(tmp_path, run_cli):
     assert not steps
     told.clear()
     changed = suite(shapes=["ring:300"], methods=[ours, {**theirs, "training": {**paper, "rate": 1e-3}}])
-    run_suite(changed, tmp_path / "rows.jsonl", items=tmp_path / "items", on_row=steps.append, on_epoch=told.append)
+    run_suite(changed, tmp_path / "rows.jsonl", items=item_folder, on_row=steps.append, on_epoch=told.append)
     assert [text.split(",")[0] for text in told] == ["theirs: epoch 1 of 1"]  # and not a refusal to go on
     assert [step.row["method"] for step in steps] == ["theirs"]
     wrong = suite(methods=[{**ours, "training": {"epoch": 2}}])
     with pytest.raises(OptionError, match="did you mean 'epochs'"):
-        run_suite(wrong, tmp_path / "others.jsonl", items=tmp_path / "items")
+        run_suite(wrong, tmp_path / "others.jsonl", items=item_folder)

@@ -17,7 +17,7 @@ pytestmark = pytest.mark.slow
 
 @pytest.mark.skipif(sys.platform == "win32", reason="Windows has no SIGINT for a single process")
 def test_interrupt_leaves_no_file(large_torus_obj, tmp_path):
-    words = ["remesh", str(large_torus_obj), "-o", str(tmp_path / "out.ply"), "-n", "9000"]
+    words = ["remesh", str(large_torus_obj), "-o", str(tmp_path / "out.ply"), "-n", "9000", "--embedding", "direct"]
     words += ["--report", str(tmp_path / "report.json")]
     before = signal.signal(signal.SIGINT, signal.default_int_handler)  # a signal ignored here the child would ignore
     with subprocess.Popen(
@@ -49,7 +49,7 @@ def test_interrupt_leaves_no_file(large_torus_obj, tmp_path):
 def test_killed_at_any_moment_the_old_file_or_the_whole_new_one_is_there(torus_obj, tmp_path):
     """Runs are killed ever later, until one is through; where it writes, the moments are close together."""
     out = tmp_path / "out.ply"
-    words = [*CLI, "remesh", str(torus_obj), "-o", str(out), "-n", "150", "--quiet"]
+    words = [*CLI, "remesh", str(torus_obj), "-o", str(out), "-n", "150", "--embedding", "direct", "--quiet"]
     start = time.perf_counter()
     subprocess.run(words, check=True, timeout=240)
     whole, n_new = time.perf_counter() - start, load(out).n_points

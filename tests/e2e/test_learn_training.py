@@ -19,10 +19,8 @@ from tensorboard.backend.event_processing.event_accumulator import EventAccumula
 
 import anisomesh  # noqa: E402
 from anisomesh.errors import OptionError  # noqa: E402
-from anisomesh.learn.data.items import load_item, save_item  # noqa: E402
-from anisomesh.learn.data.make import items_of_blobs  # noqa: E402
+from anisomesh.learn.data.items import load_item  # noqa: E402
 from anisomesh.learn.data.manifest import ItemFiles, files_of  # noqa: E402
-from anisomesh.learn.data.recipe import Recipe  # noqa: E402
 from anisomesh.learn.inference.predict import predict  # noqa: E402
 from anisomesh.learn.inference.pretrained import weights_path  # noqa: E402
 from anisomesh.learn.models.checkpoint import WeightsError, load_state, load_weights, save_state  # noqa: E402
@@ -34,7 +32,6 @@ from anisomesh.learn.training.tasks import StretchTask  # noqa: E402
 from anisomesh.learn.training.train import train  # noqa: E402
 from anisomesh.mesh.geometry import unit_frame  # noqa: E402
 from anisomesh.mesh.working_surface import working_surface  # noqa: E402
-from anisomesh.shapes.implicit import Blobs  # noqa: E402
 from conftest import CLI  # noqa: E402
 
 PAPER = PaperOptions(channels=8, levels=2)
@@ -42,22 +39,8 @@ NETWORK = NetworkOptions(channels=16, scales=3, blocks=1, heads=2)
 
 
 @pytest.fixture(scope="module")
-def files(tmp_path_factory):
-    folder = tmp_path_factory.mktemp("items")
-    paths = []
-    for seed in range(2):
-        blobs = Blobs.random(np.random.default_rng(seed))
-        made = items_of_blobs(blobs, Recipe(target=300), np.random.default_rng(seed), anisomesh.remesh)
-        for entry in made:
-            paths.append(folder / f"blobs-{seed}.{entry.kind}.npz")
-            save_item(entry.item, paths[-1])
-    rows = [
-        {"name": f"blobs-{seed}", "family": str(seed), "split": split, "fingerprint": "", "status": "kept"}
-        | {"items": [{"file": path.name, "kind": path.name.split(".")[1]} for path in paths[3 * seed : 3 * seed + 3]]}
-        for seed, split in enumerate(("training", "validation"))
-    ]
-    (folder / "manifest.jsonl").write_text("".join(json.dumps(row) + "\n" for row in rows))
-    return files_of(folder)
+def files(item_folder):
+    return files_of(item_folder)
 
 
 def options_with(folder, **changes):
