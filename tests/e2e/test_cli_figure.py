@@ -71,6 +71,7 @@ def test_a_result_is_drawn_beside_its_input_with_the_same_camera(figure):
     assert different(other[60:700, :800], other[60:700, 800:]) > 0.02
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("colour", ["stretch", "quality", "distance"])
 def test_colour_is_on_the_result_and_its_bar_below_it(figure, colour):
     plain = pixels(figure("result", "fine.obj", "coarse.obj"))
@@ -117,6 +118,7 @@ def test_scale_gives_more_pixels_of_the_same_picture(figure):
     assert np.abs(shrunk - np.asarray(small.convert("RGB")).astype(int)).mean() < 6.0
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("count", "words", "grid"), [(1, [], (1, 1)), (5, [], (3, 2)), (5, ["--columns", 2], (2, 3)), (3, [], (3, 1))]
 )

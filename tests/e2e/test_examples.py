@@ -36,12 +36,14 @@ def test_remesh_a_surface(tmp_path, capsys, torus_obj):
     assert f"1,152 -> {result.surface.n_points:,} vertices" in capsys.readouterr().out
 
 
+@pytest.mark.slow
 def test_own_metric_stretches_the_triangles_along_z(stretch_along_z):
     edges = stretch_along_z.surface.points[stretch_along_z.surface.edges]
     size = np.abs(edges[:, 1] - edges[:, 0])
     assert size[:, 2].mean() > 1.8 * np.hypot(size[:, 0], size[:, 1]).mean()
 
 
+@pytest.mark.slow
 def test_own_metric_keeps_the_open_cylinder(stretch_along_z):
     validity = stretch_along_z.report()["validity"]
     assert (validity["boundary_loops"], validity["components"], validity["euler"]) == (2, 1, 0)

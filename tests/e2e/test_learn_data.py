@@ -46,6 +46,12 @@ def folder(tmp_path):
     return folder
 
 
+@pytest.fixture
+def in_this_process(monkeypatch):
+    """Make items without a new process for each source."""
+    monkeypatch.setattr("anisomesh.learn.data.build.isolated", lambda work: work)
+
+
 @pytest.mark.slow
 def test_a_build_keeps_drops_and_lists_and_a_second_one_does_nothing(folder, tmp_path):
     out, calls = tmp_path / "out", []
@@ -105,16 +111,16 @@ def test_a_build_that_was_killed_goes_on(folder, tmp_path):
 
 
 @pytest.mark.slow
-def test_the_manifest_has_the_requested_sources_and_their_current_families(folder, tmp_path):
+def test_the_manifest_has_the_requested_sources_and_their_current_families(in_this_process, folder, tmp_path):
     out, recipe = tmp_path / "out", Recipe(target=200, variants=())
-    build(sources_of(folder, 2), out, recipe, remesh, workers=2)
+    build(sources_of(folder, 2), out, recipe, remesh, workers=1)
     (folder / "odd.ply").mkdir()  # no mesh, in spite of its name
     files = [path.relative_to(folder).as_posix() for path in sorted(folder.rglob("*.ply")) if path.is_file()]
     list_ = "".join(f"{file},{'one' if 'egg' in file else file}\n" for file in files)
     (folder / "manifest.csv").write_text("\ufefffile,family\n" + list_, encoding="utf-8")
     made = []
     sources = sources_of(folder, 1, validation=0.6)
-    rows = build(sources, out, recipe, remesh, workers=2, on_row=lambda row, *_: made.append(row))
+    rows = build(sources, out, recipe, remesh, workers=1, on_row=lambda row, *_: made.append(row))
     (folder / "odd.ply").rmdir()
     assert made == []
     assert read_manifest(out) == rows
@@ -151,9 +157,9 @@ def test_wrong_folders_and_lists_are_refused(tmp_path):
 
 
 @pytest.mark.slow
-def test_the_command_builds_and_tells(run_cli, folder, tmp_path):
+def test_the_command_builds_and_tells(in_this_process, run_cli, folder, tmp_path):
     words = ("dataset", "build", folder, tmp_path / "out", "--target", 200, "--blobs", 1, "--parts", 1, "--no-variants")
-    done = run_cli(*words)
+    done = run_cli(*words, "--workers", 1)
     assert done.returncode == 0, done.stderr
     assert "bad" in done.stderr
     assert "[7/7]" in done.stderr

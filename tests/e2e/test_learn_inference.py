@@ -140,6 +140,7 @@ def test_meshes_of_few_points_have_graphs_without_edges(surface):
     assert np.isfinite(found.points).all()
 
 
+@pytest.mark.slow
 def test_the_default_embedding_is_hybrid_for_the_curvature_metric(egg):
     tensors = np.tile(np.eye(3), (egg.n_points, 1, 1))
     for metric, wanted in (("curvature", "hybrid"), ("approximation", "direct"), (tensors, "direct")):
@@ -148,6 +149,7 @@ def test_the_default_embedding_is_hybrid_for_the_curvature_metric(egg):
         assert result.report()["embedding"] == wanted
 
 
+@pytest.mark.slow
 def test_the_hybrid_metric_is_between_the_two(egg):
     options = {"n_vertices": 100, "max_iterations": 0}
     means = {
@@ -174,6 +176,7 @@ def test_missing_weights_and_devices_are_refused(egg, tmp_path):
             anisomesh.remesh(egg, n_vertices=100, embedding="neural", device="cuda")
 
 
+@pytest.mark.slow
 def test_the_command_takes_the_pretrained_network(egg, tmp_path, run_cli):
     anisomesh.save(egg, tmp_path / "in.ply")
     done = run_cli("remesh", tmp_path / "in.ply", "-o", tmp_path / "out.ply", "-n", 200, "--embedding", "hybrid")

@@ -54,6 +54,7 @@ def test_a_source_may_move_the_points_and_bring_extra_coordinates():
     assert result.embedding.points.shape[1] == 8
 
 
+@pytest.mark.slow
 def test_an_energy_of_ones_own_gives_what_the_built_in_one_gives():
     own, built_in = (
         anisomesh.remesh(SURFACE, n_vertices=80, energy=energy, metric="uniform", **DIRECT)

@@ -53,6 +53,7 @@ def test_triangles_follow_the_metric(result):
     assert quality > anisotropic_quality(points, result.surface.faces, np.broadcast_to(np.eye(3), (400, 3, 3))).mean()
 
 
+@pytest.mark.slow
 def test_every_kind_of_input_gives_the_same(ring):
     trimesh = pytest.importorskip("trimesh")
     pyvista = pytest.importorskip("pyvista")
@@ -68,6 +69,7 @@ def test_every_kind_of_input_gives_the_same(ring):
         np.testing.assert_array_equal(other.faces, results[0].faces)
 
 
+@pytest.mark.slow
 def test_same_seed_same_bytes_whatever_the_threads(ring):
     runs = [anisomesh.remesh(ring, n_vertices=300, threads=threads, **FEW).surface for threads in (1, 2, 3)]
     other = anisomesh.remesh(ring, n_vertices=300, seed=1, **FEW).surface
@@ -75,6 +77,7 @@ def test_same_seed_same_bytes_whatever_the_threads(ring):
     assert other.points.tobytes() != runs[0].points.tobytes()
 
 
+@pytest.mark.slow
 def test_an_open_surface_gives_the_same_bytes_whatever_the_threads():
     patch = open_patch(lambda x, y: 0.3 * np.sin(4 * x) * y, n=24)
     runs = [anisomesh.remesh(patch, n_vertices=120, threads=threads, **FEW).surface for threads in (1, 2, 2)]
@@ -110,6 +113,7 @@ def test_an_open_surface_keeps_its_boundary_loop_and_corners():
     assert not result.warnings
 
 
+@pytest.mark.slow
 def test_own_metric_stretches_as_asked():
     """Triangles of a cylinder asked to be three times as long around as along."""
     tube = cylinder(1.0, 4.0, 72, 40, closed=False)
@@ -125,6 +129,7 @@ def test_own_metric_stretches_as_asked():
     assert 0.7 < np.sqrt((np.linalg.norm(vector[:, :2], axis=1) ** 2).mean() / (vector[:, 2] ** 2).mean()) < 1.4
 
 
+@pytest.mark.slow
 def test_corners_of_a_machine_part_are_met():
     part = cad_part(10)
     result = anisomesh.remesh(part, ratio=0.3)

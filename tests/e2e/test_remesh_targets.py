@@ -38,6 +38,7 @@ def test_the_count_is_exact(name, n):
     assert not result.warnings
 
 
+@pytest.mark.slow
 def test_coinciding_sites_do_not_lower_the_count():
     """Regression: sites that coincide have no cell of their own, and the result had fewer vertices than asked."""
     surface = Surface([[0, 0, 0], [1, 0, 0], [1, 1, 0], [0, 1, 0]], [[0, 1, 2], [0, 2, 3]])
@@ -59,6 +60,7 @@ def test_a_result_is_within_the_requested_error(shape, share):
     assert surface_distance(shape, fewer.surface, 30_000).hausdorff > asked
 
 
+@pytest.mark.slow
 def test_an_error_out_of_reach_is_refused():
     rough = sphere(1)
     with pytest.raises(OptionError, match=r"max_error = 1e-09 is not reached: with 1,168 vertices"):
@@ -107,6 +109,7 @@ def test_a_line_on_a_plane_is_followed_exactly():
     assert new.n_points == 70
 
 
+@pytest.mark.slow
 def test_the_feature_angle_decides_what_a_crease_is():
     part, features = cad_part(10), cad_features(10)  # with one weak crease, of 20 degrees
     weak = topology.edge_keys(features.creases[features.weak])
@@ -135,6 +138,7 @@ def test_the_command_reads_the_edges_and_says_what_is_wrong_with_them(run_cli, t
     assert done.stderr.strip().splitlines()[-1].startswith("anisomesh: error: features has points")
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("text", ["0.02", "0.55%"])
 def test_the_command_searches_for_a_count(run_cli, tmp_path, torus_obj, text):
     done = run_cli("remesh", torus_obj, "-o", tmp_path / "out.ply", "--max-error", text, "--json", "--quiet")
@@ -179,6 +183,7 @@ def test_a_time_limit_that_leaves_nothing_is_an_error(run_cli, tmp_path, torus_o
     assert "time limit" in done.stderr.strip().splitlines()[-1]
 
 
+@pytest.mark.slow
 def test_a_time_limit_ends_the_search_with_the_best_result_so_far():
     surface, tried = ellipsoid((2.0, 1.0, 0.5), 3), []
 

@@ -46,6 +46,7 @@ def test_the_right_panel_shows_the_result(torus, tmp_path):
     assert (np.abs(image[:, :800] - image[:, 800:]).max(axis=2) > 30).mean() > 0.02
 
 
+@pytest.mark.slow
 def test_position_and_size_of_the_model_do_not_matter(torus, tmp_path):
     moved = torus.with_points(1e3 * torus.points + [5e3, -2e4, 1e3])
     first = draw(tmp_path / "a.png", torus, torus)
@@ -53,6 +54,7 @@ def test_position_and_size_of_the_model_do_not_matter(torus, tmp_path):
     assert (np.abs(first - second).max(axis=2) > 40).mean() < 0.01
 
 
+@pytest.mark.slow
 def test_values_colour_the_result_only(torus, tmp_path):
     plain = draw(tmp_path / "a.png", torus, torus)
     image = draw(tmp_path / "b.png", torus, torus, values=triangle_stretch(torus))
@@ -61,6 +63,7 @@ def test_values_colour_the_result_only(torus, tmp_path):
     assert coloured(image[:, 800:]) > 0.1
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("values", [1.0, 0.0, np.inf], ids=str)
 def test_values_without_a_range_are_drawn(torus, tmp_path, values):
     image = draw(tmp_path / "a.png", torus, torus, values=np.full(torus.n_faces, values))
@@ -68,6 +71,7 @@ def test_values_without_a_range_are_drawn(torus, tmp_path, values):
     assert (image[:, 800:].min(axis=2) < 245).mean() > 0.2
 
 
+@pytest.mark.slow
 def test_cells_get_a_third_panel_of_many_colours(torus, tmp_path):
     cells = CellPolygons(
         points=torus.points,

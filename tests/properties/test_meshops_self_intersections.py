@@ -85,6 +85,7 @@ def test_tries_are_bounded():
     np.testing.assert_array_equal(faces, broken.faces)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("gap", [0.03, 0.01, 0.003])
 def test_a_remesh_of_sheets_close_together_has_no_intersection(gap):
     """Coarse triangles on curved shells as near to each other as a few per cent of their edges."""
