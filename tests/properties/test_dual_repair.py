@@ -15,8 +15,8 @@ from anisomesh.mesh.geometry import thickness
 from anisomesh.mesh.surface import Surface
 from anisomesh.mesh.validity import check_validity, flipped_faces
 from anisomesh.meshops.collapse import collapsible_edges, decimate
-from anisomesh.meshops.split import grow
-from anisomesh.meshops.untangle import untangle
+from anisomesh.meshops.inverted import remove_inverted_triangles
+from anisomesh.meshops.split import split_longest_edges
 from anisomesh.shapes.analytic import box, cad_part, open_patch, sphere, torus
 from anisomesh.voronoi.cells import cells_of
 from anisomesh.voronoi.restricted import RestrictedVoronoi
@@ -99,7 +99,7 @@ def test_folded_triangles_are_turned_back(name, seed):
         points[u] += 1.6 * (points[v] - points[u])  # over the neighbour and beyond
     folded = Surface(points, surface.faces)
     assert flipped_faces(folded, surface).any()
-    mended_points, faces, left = untangle(folded.points, folded.faces, ClosestPoints(surface))
+    mended_points, faces, left = remove_inverted_triangles(folded.points, folded.faces, ClosestPoints(surface))
     mended = Surface(mended_points, faces)
     assert left == 0
     assert not flipped_faces(mended, surface).any()
@@ -108,7 +108,7 @@ def test_folded_triangles_are_turned_back(name, seed):
 
 def test_a_good_mesh_is_left_alone():
     surface = SHAPES["part"]
-    points, faces, left = untangle(surface.points, surface.faces, ClosestPoints(surface))
+    points, faces, left = remove_inverted_triangles(surface.points, surface.faces, ClosestPoints(surface))
     assert left == 0
     assert points is surface.points
     assert faces is surface.faces
@@ -219,7 +219,7 @@ def test_a_triangle_nearest_to_another_sheet_is_turned_back():
     mesh = coarse.with_points(coarse.points + [0, 0, 0.002] * np.sin(40 * coarse.points[:, [0]]))
     closest = ClosestPoints(reference)
     assert closest.turned(mesh.points[mesh.faces]).any()
-    points, faces, left = untangle(mesh.points, mesh.faces, closest)
+    points, faces, left = remove_inverted_triangles(mesh.points, mesh.faces, closest)
     assert left == 0
     assert not closest.turned(points[faces]).any()
     assert_same_topology(Surface(points, faces), mesh)
@@ -279,7 +279,7 @@ def test_splits_reach_the_number_on_the_surface_and_keep_topology_and_side(name)
     points, faces, _ = decimate(surface.points, surface.faces, surface.n_points // 3, reference)
     roots = np.tile(np.diag([1.0, 1.0, 3.0]), (len(points), 1, 1))
     n = len(points) + 37
-    grown, new_faces = grow(points, faces, n, reference, roots)
+    grown, new_faces = split_longest_edges(points, faces, n, reference, roots)
     assert len(grown) == n
     np.testing.assert_array_equal(grown[: len(points)], points)
     result = Surface(grown, new_faces)
@@ -287,4 +287,4 @@ def test_splits_reach_the_number_on_the_surface_and_keep_topology_and_side(name)
     assert flipped_faces(result, surface).sum() == 0
     inner = np.arange(len(points), n)[~result.on_boundary[len(points) :]]
     assert np.sqrt(reference.squared_distances(grown[inner])).max() < 1e-9
-    assert grow(points, faces, len(points), reference, roots)[0] is points
+    assert split_longest_edges(points, faces, len(points), reference, roots)[0] is points

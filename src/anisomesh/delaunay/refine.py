@@ -23,9 +23,9 @@ from anisomesh.mesh.surface import Surface
 from anisomesh.mesh.topology import edge_keys, half_edges
 from anisomesh.meshops.collapse import Links, decimate, fixed_by
 from anisomesh.meshops.flip import flip_for_shape
-from anisomesh.meshops.self_intersections import separate
-from anisomesh.meshops.split import grow
-from anisomesh.meshops.untangle import untangle
+from anisomesh.meshops.inverted import remove_inverted_triangles
+from anisomesh.meshops.self_intersections import remove_self_intersections
+from anisomesh.meshops.split import split_longest_edges
 from anisomesh.metric.quality import transfer_metric_roots
 from anisomesh.metric.tensors import metric_root
 from anisomesh.voronoi.cells import Cells, cells_of
@@ -193,7 +193,7 @@ def _refined(task: _Task, sites: Sites, n_start: int) -> Refined:
     roots = transfer_metric_roots(reference, task.roots, space)
     faces = flip_for_shape(space, faces, roots, reference, kept=links)
     if len(space) < n_vertices:
-        space, faces = grow(space, faces, n_vertices, reference, roots)
+        space, faces = split_longest_edges(space, faces, n_vertices, reference, roots)
     tries = _TRIES if mesh else _TRIES_COARSENED
     space, faces = _without_crossings(space, faces, links, n_vertices, reference, tries, stop)
     return Refined(
@@ -260,7 +260,7 @@ def _untangled(
     points: Points, faces: Faces, links: Links, kept: PointMask, reference: ClosestPoints, stop: Stop
 ) -> _Linked:
     """Return the mesh with turned triangles mended, and the links and points to be kept that have not moved."""
-    after, faces, _ = untangle(points, faces, reference, stop=stop)
+    after, faces, _ = remove_inverted_triangles(points, faces, reference, stop=stop)
     if after is points:
         return points, faces, links, kept
     places = {point.tobytes(): number for number, point in enumerate(after)}
@@ -275,13 +275,13 @@ def _without_crossings(
 ) -> tuple[Points, Faces]:
     """Return the mesh with intersecting triangles taken apart, and back at no more points than before if possible."""
     n_wanted = max(n_vertices, len(points))
-    points, faces, crossing = separate(points, faces, reference, max_tries=tries, stop=stop)
+    points, faces, crossing = remove_self_intersections(points, faces, reference, max_tries=tries, stop=stop)
     for _ in range(_MAX_TRIMS):
         if len(points) <= n_wanted:
             break
         kept = np.arange(len(points)) >= n_wanted
         points_left, faces_left, links_left = decimate(points, faces, n_wanted, reference, kept=kept, creases=links)
-        coarser = separate(points_left, faces_left, reference, max_tries=_TRIM_TRIES, stop=stop)
+        coarser = remove_self_intersections(points_left, faces_left, reference, max_tries=_TRIM_TRIES, stop=stop)
         if coarser[2] > crossing:
             break
         points, faces, crossing = coarser
