@@ -8,7 +8,7 @@ from anisomesh.mesh.closest_points import ClosestPoints
 from anisomesh.mesh.intersections import self_intersections
 from anisomesh.mesh.surface import Surface
 from anisomesh.mesh.validity import check_validity, crossing_facets, new_intersections
-from anisomesh.meshops.self_intersections import separate
+from anisomesh.meshops.self_intersections import remove_self_intersections
 from anisomesh.pipeline import remesh
 from anisomesh.shapes.analytic import box, sphere
 
@@ -40,7 +40,7 @@ def test_points_that_reach_into_another_sheet_come_back(seed):
     reference = sheets()
     broken = dented(reference, seed, 0.06)
     before = len(self_intersections(broken))
-    points, faces, left = separate(broken.points, broken.faces, ClosestPoints(reference))
+    points, faces, left = remove_self_intersections(broken.points, broken.faces, ClosestPoints(reference))
     assert left == len(self_intersections(Surface(points, faces)))
     assert left == 0 or left < before
     assert_closed_manifold(faces, 4)
@@ -49,7 +49,7 @@ def test_points_that_reach_into_another_sheet_come_back(seed):
 
 def test_a_mesh_without_intersections_is_returned_as_it_is():
     reference = sheets()
-    points, faces, left = separate(reference.points, reference.faces, ClosestPoints(reference))
+    points, faces, left = remove_self_intersections(reference.points, reference.faces, ClosestPoints(reference))
     assert left == 0
     np.testing.assert_array_equal(points, reference.points)
     np.testing.assert_array_equal(faces, reference.faces)
@@ -58,7 +58,7 @@ def test_a_mesh_without_intersections_is_returned_as_it_is():
 def test_intersections_of_the_surface_itself_are_left():
     crossing = both(sphere(2), moved(sphere(2), [0.9, 0.1, 0.2]))
     assert len(self_intersections(crossing)) > 0
-    points, faces, left = separate(crossing.points, crossing.faces, ClosestPoints(crossing))
+    points, faces, left = remove_self_intersections(crossing.points, crossing.faces, ClosestPoints(crossing))
     assert left == 0
     np.testing.assert_array_equal(points, crossing.points)
     np.testing.assert_array_equal(faces, crossing.faces)
@@ -80,7 +80,7 @@ def test_new_intersections_are_those_away_from_the_old_ones():
 def test_tries_are_bounded():
     reference = sheets()
     broken = dented(reference, 0, 0.06)
-    _, faces, left = separate(broken.points, broken.faces, ClosestPoints(reference), max_tries=0)
+    _, faces, left = remove_self_intersections(broken.points, broken.faces, ClosestPoints(reference), max_tries=0)
     assert left == len(self_intersections(broken)) > 0
     np.testing.assert_array_equal(faces, broken.faces)
 

@@ -9,8 +9,8 @@ from anisomesh.mesh.geometry import thickness
 from anisomesh.mesh.surface import Surface
 from anisomesh.mesh.validity import check_validity, inverted_faces
 from anisomesh.meshops.collapse import collapsible_edges, decimate
-from anisomesh.meshops.split import grow
-from anisomesh.meshops.untangle import untangle
+from anisomesh.meshops.inverted import remove_inverted_triangles
+from anisomesh.meshops.split import split_longest_edges
 from anisomesh.shapes.analytic import box, cad_part, open_patch, sphere, torus
 
 SHAPES = {"sphere": sphere(3), "torus": torus(1.0, 0.3, 48, 16), "part": cad_part(8)}
@@ -82,7 +82,7 @@ def test_link_condition_against_sets():
 
 @pytest.mark.parametrize("name", SHAPES)
 @pytest.mark.parametrize("seed", range(3))
-def test_folded_triangles_are_untangled(name, seed):
+def test_inverted_triangles_are_removed(name, seed):
     surface = SHAPES[name]
     rng = np.random.default_rng(seed)
     points = np.array(surface.points)
@@ -91,7 +91,7 @@ def test_folded_triangles_are_untangled(name, seed):
         points[u] += 1.6 * (points[v] - points[u])  # over the neighbour and beyond
     folded = Surface(points, surface.faces)
     assert inverted_faces(folded, surface).any()
-    mended_points, faces, left = untangle(folded.points, folded.faces, ClosestPoints(surface))
+    mended_points, faces, left = remove_inverted_triangles(folded.points, folded.faces, ClosestPoints(surface))
     mended = Surface(mended_points, faces)
     assert left == 0
     assert not inverted_faces(mended, surface).any()
@@ -100,13 +100,13 @@ def test_folded_triangles_are_untangled(name, seed):
 
 def test_a_mesh_without_inverted_triangles_is_returned_unchanged():
     surface = SHAPES["part"]
-    points, faces, left = untangle(surface.points, surface.faces, ClosestPoints(surface))
+    points, faces, left = remove_inverted_triangles(surface.points, surface.faces, ClosestPoints(surface))
     assert left == 0
     assert points is surface.points
     assert faces is surface.faces
 
 
-def test_a_triangle_nearest_to_another_sheet_is_untangled():
+def test_an_inverted_triangle_nearest_to_another_sheet_is_removed():
     # two sheets that cross: near the line where they meet a triangle of one can be nearest to the other
     n = 12
     sheet = open_patch(lambda x, y: 0.0 * x, n=n)
@@ -118,7 +118,7 @@ def test_a_triangle_nearest_to_another_sheet_is_untangled():
     mesh = coarse.with_points(coarse.points + [0, 0, 0.002] * np.sin(40 * coarse.points[:, [0]]))
     closest = ClosestPoints(reference)
     assert closest.inverted(mesh.points[mesh.faces]).any()
-    points, faces, left = untangle(mesh.points, mesh.faces, closest)
+    points, faces, left = remove_inverted_triangles(mesh.points, mesh.faces, closest)
     assert left == 0
     assert not closest.inverted(points[faces]).any()
     assert_same_topology(Surface(points, faces), mesh)
@@ -178,7 +178,7 @@ def test_splits_reach_the_number_on_the_surface_and_keep_topology_and_side(name)
     points, faces, _ = decimate(surface.points, surface.faces, surface.n_points // 3, reference)
     roots = np.tile(np.diag([1.0, 1.0, 3.0]), (len(points), 1, 1))
     n = len(points) + 37
-    grown, new_faces = grow(points, faces, n, reference, roots)
+    grown, new_faces = split_longest_edges(points, faces, n, reference, roots)
     assert len(grown) == n
     np.testing.assert_array_equal(grown[: len(points)], points)
     result = Surface(grown, new_faces)
@@ -186,4 +186,4 @@ def test_splits_reach_the_number_on_the_surface_and_keep_topology_and_side(name)
     assert inverted_faces(result, surface).sum() == 0
     inner = np.arange(len(points), n)[~result.on_boundary[len(points) :]]
     assert np.sqrt(reference.squared_distances(grown[inner])).max() < 1e-9
-    assert grow(points, faces, len(points), reference, roots)[0] is points
+    assert split_longest_edges(points, faces, len(points), reference, roots)[0] is points

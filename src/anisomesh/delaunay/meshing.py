@@ -22,9 +22,9 @@ from anisomesh.mesh.topology import edge_keys, half_edges
 from anisomesh.meshops.collapse import decimate, fixed_by
 from anisomesh.meshops.edge_recovery import recover_edges
 from anisomesh.meshops.flip import flip_for_shape
-from anisomesh.meshops.self_intersections import separate
-from anisomesh.meshops.split import grow
-from anisomesh.meshops.untangle import untangle
+from anisomesh.meshops.inverted import remove_inverted_triangles
+from anisomesh.meshops.self_intersections import remove_self_intersections
+from anisomesh.meshops.split import split_longest_edges
 from anisomesh.metric.tensors import metric_root
 from anisomesh.metric.transfer import transfer_metric_roots
 from anisomesh.voronoi.cells import CellComplex
@@ -196,7 +196,7 @@ def _attempt(task: MeshingTask, sites: Sites, n_start: int) -> ValidMesh:
     points = mesh.points
     faces = flip_for_shape(points, mesh.faces, roots, task.reference, kept=mesh.crease_edges)
     if len(points) < task.n_vertices:
-        points, faces = grow(points, faces, task.n_vertices, task.reference, roots)
+        points, faces = split_longest_edges(points, faces, task.n_vertices, task.reference, roots)
     tries = _MAX_TRIES if dual is not None else _MAX_TRIES_COARSENED
     points, faces = _without_crossings(task, points, faces, mesh.crease_edges, tries)
     return ValidMesh(
@@ -227,7 +227,7 @@ def _dual_in_space(task: MeshingTask, controlled: ControlledCells) -> FeatureMes
 
 def _without_inverted(task: MeshingTask, mesh: FeatureMesh) -> FeatureMesh:
     """Return the mesh with inverted triangles repaired, and the crease edges and locked points that have not moved."""
-    points, faces, _ = untangle(mesh.points, mesh.faces, task.reference, deadline=task.deadline)
+    points, faces, _ = remove_inverted_triangles(mesh.points, mesh.faces, task.reference, deadline=task.deadline)
     if points is mesh.points:
         return FeatureMesh(points, faces, mesh.crease_edges, mesh.locked)
     places = {point.tobytes(): number for number, point in enumerate(points)}
@@ -255,13 +255,17 @@ def _without_crossings(
     """Return the mesh without new self-intersections where possible, with no more points than before where possible."""
     reference = task.reference
     n_wanted = max(task.n_vertices, len(points))
-    points, faces, crossing = separate(points, faces, reference, max_tries=tries, deadline=task.deadline)
+    points, faces, crossing = remove_self_intersections(
+        points, faces, reference, max_tries=tries, deadline=task.deadline
+    )
     for _ in range(_MAX_TRIMS):
         if len(points) <= n_wanted:
             break
         kept = np.arange(len(points)) >= n_wanted
         points_left, faces_left, links_left = decimate(points, faces, n_wanted, reference, kept=kept, creases=links)
-        coarser = separate(points_left, faces_left, reference, max_tries=_TRIM_TRIES, deadline=task.deadline)
+        coarser = remove_self_intersections(
+            points_left, faces_left, reference, max_tries=_TRIM_TRIES, deadline=task.deadline
+        )
         if coarser[2] > crossing:
             break
         points, faces, crossing = coarser

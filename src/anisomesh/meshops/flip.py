@@ -12,6 +12,7 @@ from anisomesh.mesh import geometry
 from anisomesh.mesh.closest_points import ClosestPoints
 from anisomesh.mesh.surface import Surface
 from anisomesh.mesh.topology import edge_keys
+from anisomesh.meshops.change import Change, Ints, apply_changes
 from anisomesh.metric.quality import anisotropic_quality
 
 _MAX_ROUNDS = 20
@@ -20,8 +21,6 @@ _MAX_TURN = 30.0  # degrees between the normals of the triangles before and afte
 _SLACK = 0.01  # edge lengths by which the new edge may be farther from the surface than the old one
 _FLAT_QUALITY = -2.0  # of a triangle without area: no gain elsewhere makes up for one
 _FLAT_SLACK = 0.25  # the same as the other slack, to be rid of one
-
-Ints = npt.NDArray[np.int64]
 
 
 @dataclass(frozen=True, eq=False)
@@ -47,6 +46,10 @@ class Flips:
         """Return some of the flips, by mask (n,)."""
         return Flips(self.pair[chosen], self.old[chosen], self.new[chosen], self.triangles[chosen])
 
+    def change(self, k: int) -> Change:
+        """Return one flip as a change."""
+        return Change(self.pair[k], self.triangles[k])
+
 
 def possible_flips(surface: Surface, edges: npt.NDArray[np.integer]) -> Flips:
     """Return the flips of these edges (n,) that keep the mesh a manifold; edges with one triangle have none."""
@@ -62,12 +65,12 @@ def possible_flips(surface: Surface, edges: npt.NDArray[np.integer]) -> Flips:
     return Flips(pair, np.stack([x, y], axis=1), np.stack([a, b], axis=1), triangles).take(free)
 
 
-def do_flips(faces: Faces, flips: Flips, order: Ints) -> Faces:
-    """Return the faces (F, 3) after the flips in this order, but those that an earlier one stands in the way of.
+def do_flips(surface: Surface, flips: Flips, order: Ints) -> Faces:
+    """Return the faces (F, 3) after the flips in this order, except flips that conflict with an earlier one.
 
     No triangle changes twice and no edge is made twice; so every flip has the effect that it has alone.
     """
-    changed = faces.copy()
+    changes = []
     taken: set[int] = set()
     made: set[tuple[int, int]] = set()
     for k in order.tolist():
@@ -76,8 +79,8 @@ def do_flips(faces: Faces, flips: Flips, order: Ints) -> Faces:
         if first not in taken and second not in taken and (low, high) not in made:
             taken |= {first, second}
             made.add((low, high))
-            changed[[first, second]] = flips.triangles[k]
-    return changed
+            changes.append(flips.change(k))
+    return apply_changes(surface, changes)[1]
 
 
 def flip_for_shape(
@@ -121,7 +124,7 @@ def flip_for_shape(
         flips, gain = flips.take(allowed), gain[allowed]
         if len(gain) == 0:
             break
-        changed = do_flips(faces, flips, np.argsort(-gain, kind="stable"))
+        changed = do_flips(surface, flips, np.argsort(-gain, kind="stable"))
         active = (changed != faces).any(axis=1)
         faces = changed
     return faces
