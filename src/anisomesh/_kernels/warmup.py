@@ -23,7 +23,6 @@ _REMESH = (
     neighbours.refresh_lists,
     neighbours.age_lists,
     neighbours.displacements,
-    neighbours.limit_radius,
     neighbours.walk,
     local_step.local_step,
 )

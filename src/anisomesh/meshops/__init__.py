@@ -1,1 +1,1 @@
-"""Local operations on a mesh that stands for a reference surface: collapse, flip, split, removal of inverted and intersecting triangles."""
+"""Local operations on a mesh that approximates a reference surface; its topology never changes."""

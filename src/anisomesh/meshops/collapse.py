@@ -13,8 +13,8 @@ from anisomesh.mesh.surface import Surface
 from anisomesh.mesh.topology import edge_keys
 
 _LENGTH_WEIGHT = 1e-3  # of the squared length against the squared distance to the planes
-_MIN_COSINE = 0.2  # a face turns by no more than this in one collapse
-_MIN_THICKNESS = 1e-3  # area over squared longest side of a face that a collapse may leave
+_MIN_NORMAL_COSINE = 0.2  # a face turns by no more than this in one collapse
+_MIN_COLLAPSED_THICKNESS = 1e-3  # area over squared longest side of a face that a collapse may leave
 _BATCHES = (0.1, 0.3, 1.0)  # shares of the collapses considered in one round, the larger where too few are possible
 _ENOUGH = 0.002  # of the points are a round worth while
 
@@ -41,23 +41,23 @@ def decimate(
     n_points
         Number of points wanted.
     reference
-        The surface that the mesh stands for; no collapse makes a face that is turned away from it.
+        The surface that the mesh approximates; no collapse inverts a face against it.
     kept
-        Points that do not go (V,).
+        Points that are not removed (V,).
     creases
-        Edges (n, 2) that stay: of their points only those that two of them meet at may go, and only along them.
+        Edges (n, 2) along creases: only points between two of them are removed, and only along them.
 
     Returns
     -------
     points, faces, creases
-        The coarser mesh, whose points are some of those given, and what is left of the creases.
+        The coarser mesh, whose points are a subset of the input, and the remaining crease edges.
 
     Notes
     -----
     Rounds of half-edge collapses, cheapest first, of edges far enough apart to go together. The cost is the
-    quadric error (Garland and Heckbert 1997) of the planes that met at the points that went; short edges go first
-    where that does not decide. A collapse keeps the
-    link condition (Dey, Edelsbrunner, Guha, Nekhayev 1999), so topology, orientation and boundary loops stay, and
+    quadric error (Garland and Heckbert 1997) of the planes around removed points; short edges go first where that does
+    not decide. Collapses fulfil the link condition (Dey, Edelsbrunner, Guha, Nekhayev 1999), so topology, orientation
+    and boundary loops stay, and
     no face turns by more than about 80 degrees.
     """
     links = np.zeros((0, 2), dtype=np.int64) if creases is None else creases
@@ -124,7 +124,7 @@ def _collapses(
 ) -> tuple[Ints, Ints, Ints]:
     """Return points to remove and where each goes: cheap, allowed, and with neighbourhoods that do not touch.
 
-    ``refused`` names collapses, as gone * V + into, that would leave a face turned; it is returned with those found.
+    ``refused`` names collapses, as gone * V + into, that would invert a face; it is returned with the ones found here.
     """
     edges = surface.edges[collapsible_edges(surface)].astype(np.int64)
     gone, into = np.concatenate([edges, edges[:, ::-1]]).T
@@ -176,9 +176,9 @@ def _keeps_normals(surface: Surface, gone: Ints, into: Ints) -> npt.NDArray[np.b
     """Return which collapses (n,) turn no face around the point that goes by too much, nor make it a needle."""
     which, face, moved = _changed_faces(surface, gone, into)
     new = geometry.unit(geometry.face_cross(surface.points, moved))
-    turned = np.einsum("nx,nx->n", new, surface.face_normals[face]) < _MIN_COSINE
-    flat = geometry.thickness(surface.points[moved]) < _MIN_THICKNESS
-    return np.asarray(np.bincount(which, turned | flat, minlength=len(gone)) == 0)
+    tilted = np.einsum("nx,nx->n", new, surface.face_normals[face]) < _MIN_NORMAL_COSINE
+    flat = geometry.thickness(surface.points[moved]) < _MIN_COLLAPSED_THICKNESS
+    return np.asarray(np.bincount(which, tilted | flat, minlength=len(gone)) == 0)
 
 
 def _faces_reference(surface: Surface, gone: Ints, into: Ints, reference: ClosestPoints) -> npt.NDArray[np.bool_]:

@@ -14,8 +14,8 @@ from anisomesh.meshops import candidates
 from anisomesh.meshops.change import Change, Ints, Patch, faces_beside
 from anisomesh.meshops.engine import Strategy, remove_faults
 
-MAX_ROUNDS = 100  # heuristic: hard training meshes take about 70
-_MAX_PLATEAUS = 40  # heuristic
+MAX_INVERSION_ROUNDS = 100  # heuristic: hard training meshes take about 70
+_MAX_INVERSION_PLATEAUS = 40  # heuristic
 _PLATEAU_TRIES = 32  # random moves tried for a triangle that nothing helps; with 8 more of them stay inverted
 
 
@@ -58,8 +58,8 @@ def remove_inverted_triangles(
             candidates.smoothing,
         ),
         plateau=random_nudges,
-        max_rounds=MAX_ROUNDS,
-        max_plateaus=_MAX_PLATEAUS,
+        max_rounds=MAX_INVERSION_ROUNDS,
+        max_plateaus=_MAX_INVERSION_PLATEAUS,
     )
     return remove_faults(points, faces, reference, _InvertedTriangles(reference), strategy, deadline=deadline)
 

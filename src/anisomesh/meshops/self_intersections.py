@@ -17,8 +17,8 @@ from anisomesh.meshops import candidates
 from anisomesh.meshops.change import Change, Ints, Patch, apply_changes, faces_beside
 from anisomesh.meshops.engine import Strategy, remove_faults
 
-MAX_ROUNDS = 30
-_MAX_PLATEAUS = 6
+MAX_INTERSECTION_ROUNDS = 30
+_MAX_INTERSECTION_PLATEAUS = 6
 
 
 def remove_self_intersections(
@@ -51,8 +51,8 @@ def remove_self_intersections(
     strategy = Strategy(
         candidates=(_changes,),
         plateau=candidates.edge_splits,
-        max_rounds=MAX_ROUNDS,
-        max_plateaus=_MAX_PLATEAUS,
+        max_rounds=MAX_INTERSECTION_ROUNDS,
+        max_plateaus=_MAX_INTERSECTION_PLATEAUS,
         max_tries=max_tries,
     )
     return remove_faults(points, faces, reference, _NewIntersections(reference), strategy, deadline=deadline)
