@@ -44,7 +44,7 @@ class CreaseCells:
     chord
         From the start to the end of its longest interval (n, d).
     curved
-        Whether that interval is curved (n,); never for required edges that are no crease of the faces.
+        Whether that interval is curved (n,); never for required edges that are not creases of the faces.
     corner
         Whether the component is at a corner or at the boundary (n,).
     missing

@@ -56,7 +56,7 @@ class Change:
 
 @dataclass(frozen=True, eq=False)
 class Patch:
-    """The part of a mesh around a fault, as a mesh of its own, and the surface that the mesh stands for.
+    """The part of a mesh around a fault, as a mesh of its own, and the surface that it approximates.
 
     Attributes
     ----------
@@ -69,7 +69,7 @@ class Patch:
     faulty
         Which faces (F,) have a fault, this or another one.
     reference
-        The surface that the mesh stands for.
+        The surface that the mesh approximates.
     """
 
     surface: Surface

@@ -93,8 +93,8 @@ def fixed_by(creases: Links, n_points: int) -> PointMask:
 def _quadrics(surface: Surface, links: Ints) -> Floats:
     """Return the sum of weight times squared plane at each point (V, 4, 4).
 
-    The planes are those of the faces, weighted by area, and at a boundary edge or a link the one upright on the face
-    through the edge, weighted by squared length.
+    The planes are the planes of the faces, weighted by area, and, at a boundary edge or a link, the plane through the
+    edge perpendicular to the face, weighted by squared length.
     """
     points, side, face = surface.points, surface.edges, surface.edge_faces[:, 0]
     linked = np.isin(edge_keys(surface.edges), edge_keys(links))
@@ -209,7 +209,7 @@ def _faces_at(surface: Surface) -> csr_array:
 def _apart(surface: Surface, gone: Ints, into: Ints) -> npt.NDArray[np.bool_]:
     """Return collapses (n,), in order of preference, of which no two share a point of their neighbourhoods.
 
-    Those without a better one near by are taken, then again among the others, until there are no others.
+    Greedily: collapses without a better one nearby are taken, then again among the rest, until none is left.
     """
     n = surface.n_points
     rows, columns = np.concatenate([surface.edges, surface.edges[:, ::-1]]).T

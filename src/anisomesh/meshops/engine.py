@@ -83,7 +83,7 @@ def remove_faults(
     points, faces
         An oriented manifold mesh (V, 3), (F, 3).
     reference
-        The surface that it stands for.
+        The surface that the mesh approximates.
     objective
         What the faults are.
     strategy

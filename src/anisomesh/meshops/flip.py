@@ -25,7 +25,7 @@ _FLAT_SLACK = 0.25  # the same as the other slack, to be rid of one
 
 @dataclass(frozen=True, eq=False)
 class Flips:
-    """Edges with another diagonal of their two triangles that is no edge yet.
+    """Edges with another diagonal of their two triangles that is not an edge yet.
 
     Attributes
     ----------
@@ -95,7 +95,7 @@ def flip_for_shape(
     roots
         Symmetric square roots of the metric at the points (V, 3, 3).
     reference
-        The surface that the mesh stands for.
+        The surface that the mesh approximates.
     kept
         Edges (n, 2) that stay, but for the longest side of a triangle without area: the other two are the same line.
 

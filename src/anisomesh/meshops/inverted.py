@@ -1,4 +1,4 @@
-"""Removal of triangles that face away from the surface that the mesh stands for."""
+"""Removal of inverted triangles, which face away from the reference surface."""
 
 from __future__ import annotations
 
@@ -29,7 +29,7 @@ def remove_inverted_triangles(
     points, faces
         An oriented manifold mesh (V, 3), (F, 3).
     reference
-        The surface that it stands for.
+        The surface that the mesh approximates.
     deadline
         Asked before every inverted triangle whether to end.
 

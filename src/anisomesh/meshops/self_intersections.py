@@ -1,4 +1,4 @@
-"""Removal of triangles that intersect where the surface that the mesh stands for does not."""
+"""Removal of self-intersections that the reference surface does not have."""
 
 from __future__ import annotations
 
@@ -31,7 +31,7 @@ def remove_self_intersections(
     points, faces
         An oriented manifold mesh (V, 3), (F, 3).
     reference
-        The surface that it stands for.
+        The surface that the mesh approximates.
     max_tries
         Pairs that are looked at, in all rounds together; one amid many faces counts for several.
     deadline

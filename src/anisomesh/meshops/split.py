@@ -40,7 +40,7 @@ def split_longest_edges(
     n_points
         Number of points wanted.
     reference
-        The surface that the mesh stands for. A new point goes to the place on it closest to the middle of the edge,
+        The surface that the mesh approximates. A new point goes to the place on it closest to the middle of the edge,
         one on the boundary stays in the middle; no inverted triangle is made.
     roots
         Symmetric square roots of the metric at the points (V, 3, 3).

@@ -92,7 +92,7 @@ class NeighbourLists:
     def grow(self, sites: Sites, needed: Floats) -> clip.Sites:
         """Return the table with longer lists for the sites whose needed radius (S,) is not 0.
 
-        The positions must be those of the last call of ``table``.
+        The positions must be the positions of the last call of ``table``.
         """
         short = np.flatnonzero(needed)
         wanted = _GROWTH_MARGIN * needed[short] + self._worn()[short]
