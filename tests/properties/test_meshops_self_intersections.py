@@ -7,7 +7,7 @@ from delaunay_cases import assert_closed_manifold
 from anisomesh.mesh.closest_points import ClosestPoints
 from anisomesh.mesh.intersections import self_intersections
 from anisomesh.mesh.surface import Surface
-from anisomesh.mesh.validity import check_validity, crossing_facets, new_intersections
+from anisomesh.mesh.validity import check_validity, new_intersections
 from anisomesh.meshops.self_intersections import remove_self_intersections
 from anisomesh.pipeline import remesh
 from anisomesh.shapes.analytic import box, sphere
@@ -66,15 +66,15 @@ def test_intersections_of_the_surface_itself_are_left():
 
 def test_new_intersections_are_those_away_from_the_old_ones():
     crossing = both(sphere(2), moved(sphere(2), [1.5, 0.0, 0.0]))
-    facets = crossing_facets(crossing)
-    assert len(new_intersections(crossing, facets)) == 0
+    reference = ClosestPoints(crossing)
+    assert len(new_intersections(crossing, reference)) == 0
     folded = crossing.points.copy()
     far = int(np.argmin(folded[:, 0]))  # on the other side of the first sphere
     folded[far] = [0.6, 0.0, 0.0]
-    pairs = new_intersections(crossing.with_points(folded), facets)
+    pairs = new_intersections(crossing.with_points(folded), reference)
     assert len(pairs) > 0
     assert np.isin(far, crossing.faces[pairs])
-    assert crossing_facets(sphere(1)) is None
+    assert ClosestPoints(sphere(1)).crossing_facets is None
 
 
 def test_tries_are_bounded():

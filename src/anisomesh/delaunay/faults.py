@@ -10,19 +10,15 @@ from anisomesh._arrays import EmbeddedPoints, Faces, Points, Sites
 from anisomesh.delaunay.creases import MIN_SITE_DISTANCE
 from anisomesh.mesh.closest_points import ClosestPoints
 from anisomesh.mesh.geometry import is_flat
-from anisomesh.mesh.intersections import self_intersections
 from anisomesh.mesh.surface import Surface
-from anisomesh.mesh.validity import crossing_facets, new_intersections
+from anisomesh.mesh.validity import new_intersections
 from anisomesh.voronoi.embedded_surface import EmbeddedSurface
 
 
 def faulty_faces(points: Points, faces: Faces, reference: ClosestPoints) -> npt.NDArray[np.int64]:
     """Return the faces (n,) that have no area, are inverted against the reference, or intersect where it does not."""
     bad = np.flatnonzero(is_flat(points[faces]) | reference.inverted(points[faces]))
-    mesh = Surface(points, faces)
-    if len(self_intersections(mesh)) == 0:  # the common case, without a search in the reference
-        return bad
-    return np.union1d(bad, new_intersections(mesh, crossing_facets(reference.surface)))
+    return np.union1d(bad, new_intersections(Surface(points, faces), reference))
 
 
 def points_at_faults(

@@ -8,7 +8,7 @@ import numpy.typing as npt
 from anisomesh._arrays import Faces, Points
 from anisomesh._kernels import intersections as kernels
 from anisomesh._kernels.orientation import choose_axes
-from anisomesh.mesh.geometry import unit
+from anisomesh.mesh.geometry import cross, unit
 from anisomesh.mesh.surface import Surface
 from anisomesh.mesh.weld import coincident
 
@@ -73,12 +73,33 @@ def self_intersections(surface: Surface) -> Pairs:
     return np.asarray(pairs[np.lexsort((pairs[:, 1], pairs[:, 0]))], dtype=np.int32)
 
 
+def count_intersections_from(first: int, points: Points, faces: Faces) -> int:
+    """Return the number of intersecting pairs of which one face has the number ``first`` or a higher one.
+
+    The pairs are the ones of :func:`self_intersections`, without a search tree: for a few faces among some hundred.
+
+    Parameters
+    ----------
+    first
+        Number of a face.
+    points, faces
+        A mesh (V, 3), (F, 3).
+    """
+    points, faces = _scaled(points), coincident(points)[faces]
+    axes = np.empty(len(faces), dtype=np.int8)
+    choose_axes(points, faces, axes)
+    return int(kernels.count_pairs_from(first, points, faces, axes))
+
+
+def _scaled(points: Points) -> Points:
+    """Return points scaled by a power of two to at most 1."""
+    return np.asarray(np.ldexp(points, -np.frexp(np.abs(points).max())[1]))
+
+
 def _welded(surface: Surface) -> tuple[Points, Faces]:
-    """Return the distinct vertices, scaled by a power of two to at most 1, and the faces (F, 3) on them."""
+    """Return the distinct vertices, scaled, and the faces (F, 3) on them."""
     used, inverse = np.unique(coincident(surface.points)[surface.faces], return_inverse=True)
-    points = surface.points[used]
-    points = np.ldexp(points, -np.frexp(np.abs(points).max())[1])
-    return points, inverse.reshape(-1, 3).astype(np.int32)
+    return _scaled(surface.points[used]), inverse.reshape(-1, 3).astype(np.int32)
 
 
 def _boxes(points: Points, faces: Faces) -> npt.NDArray[np.float64]:
@@ -96,7 +117,7 @@ def _slabs(points: Points, faces: Faces) -> npt.NDArray[np.float64]:
     corners = points[faces]
     sides = corners[:, [2, 0, 1]] - corners[:, [1, 2, 0]]
     longest = np.argmax(np.linalg.norm(sides, axis=2), axis=1)
-    direction = unit(np.cross(np.cross(sides[:, 1], sides[:, 2]), sides[np.arange(len(faces)), longest]))
+    direction = unit(cross(cross(sides[:, 1], sides[:, 2]), sides[np.arange(len(faces)), longest]))
     heights = np.einsum("fcx,fx->fc", corners, direction)
     low, high = heights.min(axis=1) - _SLAB_MARGIN, heights.max(axis=1) + _SLAB_MARGIN
     return np.concatenate([direction, low[:, None], high[:, None]], axis=1)

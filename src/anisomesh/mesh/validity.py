@@ -85,7 +85,7 @@ def check_validity(result: Surface, reference: Surface) -> Validity:
     reference
         Its prepared input, consistently oriented, in the same units.
     """
-    pairs_input = self_intersections(reference)
+    closest = ClosestPoints(reference)
     return Validity(
         closed=bool((result.edge_face_count == 2).all()),
         boundary_loops=len(boundary_loops(result.faces)),
@@ -99,36 +99,26 @@ def check_validity(result: Surface, reference: Surface) -> Validity:
         nonmanifold_vertices=count_nonmanifold_points(result.faces),
         oriented=is_oriented(result.faces),
         flat=int(is_flat(result.points[result.faces]).sum()),
-        inverted=int(inverted_faces(result, reference).sum()),
+        inverted=int(closest.inverted(result.points[result.faces]).sum()),
         self_intersections=len(self_intersections(result)),
-        self_intersections_input=len(pairs_input),
-        new_intersections=len(new_intersections(result, _search_tree(reference, pairs_input))),
+        self_intersections_input=len(closest.intersecting_pairs),
+        new_intersections=len(new_intersections(result, closest)),
     )
 
 
-def crossing_facets(reference: Surface) -> ClosestPoints | None:
-    """Return a search tree over the facets of a surface that intersect others, or None if there are none."""
-    return _search_tree(reference, self_intersections(reference))
-
-
-def _search_tree(surface: Surface, pairs: Pairs) -> ClosestPoints | None:
-    facets = np.unique(pairs)
-    return ClosestPoints(Surface(surface.points, surface.faces[facets])) if len(facets) else None
-
-
-def new_intersections(result: Surface, crossing: ClosestPoints | None) -> Pairs:
+def new_intersections(result: Surface, reference: ClosestPoints) -> Pairs:
     """Return the pairs of faces (n, 2) of a remesh that intersect where its input does not.
 
     A pair is attributed to the input if the barycentres of both triangles are no farther than their longest edges from
-    the intersecting facets of the input, ``crossing`` (see :func:`crossing_facets`).
+    the intersecting facets of the input. The input is searched for these only if the remesh has intersections.
     """
     pairs = self_intersections(result)
-    if len(pairs) == 0 or crossing is None:
+    if len(pairs) == 0 or reference.crossing_facets is None:
         return pairs
     faces, position = np.unique(pairs, return_inverse=True)
     corners = result.points[result.faces[faces]]
     longest = np.linalg.norm(corners - corners[:, [1, 2, 0]], axis=2).max(axis=1)
-    near = np.sqrt(crossing.squared_distances(corners.mean(axis=1))) <= longest
+    near = np.sqrt(reference.crossing_facets.squared_distances(corners.mean(axis=1))) <= longest
     return np.asarray(pairs[~near[position.reshape(-1, 2)].all(axis=1)])
 
 

@@ -48,10 +48,14 @@ class Change:
 
     def corners(self, points: Points) -> Floats:
         """Return the positions of the corners (m, 3, 3) of the new faces."""
+        return np.asarray(self.points_after(points)[self.new])
+
+    def points_after(self, points: Points) -> Points:
+        """Return the points (V, 3) after the change, with the new ones at the end and the disused ones."""
         n_new = np.count_nonzero(self.points >= len(points))
         after = np.concatenate([points, np.zeros((n_new, 3))])
         after[self.points] = self.places
-        return after[self.new]
+        return after
 
 
 @dataclass(frozen=True, eq=False)

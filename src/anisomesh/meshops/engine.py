@@ -186,17 +186,20 @@ class _Search:
 
 
 def _best_change(patch: Patch, source: Candidates, objective: Objective, *, allow_equal: bool) -> Change | None:
-    """Return the sound change that leaves the fewest faults on a patch, fewer than there are (or as many), or None."""
-    least, best = objective.count(patch) + int(allow_equal), None
+    """Return the sound change that leaves the fewest faults on a patch, fewer than there are (or as many), or None.
+
+    Of several the source's first.
+    """
+    least, best = objective.count(patch) + int(allow_equal), -1
     changes = list(source(patch))
     bounds = objective.bounds_after(patch, changes)
     for k in np.argsort(bounds, kind="stable").tolist():
-        if bounds[k] >= least:
+        if bounds[k] > least or (bounds[k] == least and best < k):
             break
         count = objective.count_after(patch, changes[k], int(bounds[k]))
-        if count < least and is_sound(patch, changes[k]):
-            least, best = count, changes[k]
-    return best
+        if (count < least or (count == least and k < best)) and is_sound(patch, changes[k]):
+            least, best = count, k
+    return changes[best] if best >= 0 else None
 
 
 def is_sound(patch: Patch, change: Change) -> bool:

@@ -8,11 +8,13 @@ import numpy as np
 
 from anisomesh._arrays import Faces, Points
 from anisomesh.deadline import NO_DEADLINE, Deadline
+from anisomesh.mesh import geometry
 from anisomesh.mesh.closest_points import ClosestPoints
 from anisomesh.mesh.surface import Surface
 from anisomesh.meshops import candidates
 from anisomesh.meshops.change import Change, Ints, Patch, faces_beside
 from anisomesh.meshops.engine import Strategy, remove_faults
+from anisomesh.meshops.flip import do_flips, possible_flips
 
 MAX_INVERSION_ROUNDS = 100  # heuristic: hard training meshes take about 70
 _MAX_INVERSION_PLATEAUS = 40  # heuristic
@@ -40,8 +42,10 @@ def remove_inverted_triangles(
 
     Notes
     -----
-    See :func:`~anisomesh.meshops.engine.remove_faults`.
+    Flips come first, all that lower the number of inverted triangles at once; the rest is left to
+    :func:`~anisomesh.meshops.engine.remove_faults`.
     """
+    faces = _flip_inverted(points, faces, reference)
     rng = np.random.default_rng(0)
 
     def random_nudges(patch: Patch) -> list[Change]:
@@ -62,6 +66,22 @@ def remove_inverted_triangles(
         max_plateaus=_MAX_INVERSION_PLATEAUS,
     )
     return remove_faults(points, faces, reference, _InvertedTriangles(reference), strategy, deadline=deadline)
+
+
+def _flip_inverted(points: Points, faces: Faces, reference: ClosestPoints) -> Faces:
+    """Return the faces (F, 3) after flips that lower the number of inverted triangles, until there are no more."""
+    while True:
+        surface = Surface(points, faces)
+        inverted = reference.inverted(points[faces])
+        flips = possible_flips(surface, np.unique(surface.face_edges[inverted]))
+        corners = points[flips.triangles].reshape(-1, 3, 3)
+        gain = inverted[flips.pair].sum(axis=1) - reference.inverted(corners).reshape(-1, 2).sum(axis=1)
+        thinnest = geometry.thickness(corners).reshape(-1, 2).min(axis=1)
+        order = np.lexsort((-thinnest, -gain))
+        order = order[(gain > 0)[order]]
+        if len(order) == 0:
+            return faces
+        faces = do_flips(surface, flips, order)
 
 
 class _InvertedTriangles:

@@ -10,11 +10,11 @@ import numpy as np
 from anisomesh._arrays import Faces, Points
 from anisomesh.deadline import NO_DEADLINE, Deadline
 from anisomesh.mesh.closest_points import ClosestPoints
-from anisomesh.mesh.intersections import self_intersections
+from anisomesh.mesh.intersections import count_intersections_from, self_intersections
 from anisomesh.mesh.surface import Surface
-from anisomesh.mesh.validity import crossing_facets, new_intersections
+from anisomesh.mesh.validity import new_intersections
 from anisomesh.meshops import candidates
-from anisomesh.meshops.change import Change, Ints, Patch, apply_changes, faces_beside
+from anisomesh.meshops.change import Change, Ints, Patch, faces_beside
 from anisomesh.meshops.engine import Strategy, remove_faults
 
 MAX_INTERSECTION_ROUNDS = 30
@@ -49,7 +49,7 @@ def remove_self_intersections(
     if len(self_intersections(Surface(points, faces))) == 0:
         return points, faces, 0  # most often, and without a search for intersections of the reference
     strategy = Strategy(
-        candidates=(_changes,),
+        candidates=(_changes, candidates.nudges, candidates.smoothing),
         plateau=candidates.edge_splits,
         max_rounds=MAX_INTERSECTION_ROUNDS,
         max_plateaus=_MAX_INTERSECTION_PLATEAUS,
@@ -66,10 +66,10 @@ class _NewIntersections:
     """The objective: the number of pairs of triangles that intersect where the reference does not."""
 
     def __init__(self, reference: ClosestPoints) -> None:
-        self.crossing = crossing_facets(reference.surface)
+        self.reference = reference
 
     def faults(self, surface: Surface) -> Ints:
-        return new_intersections(surface, self.crossing).astype(np.int64)
+        return new_intersections(surface, self.reference).astype(np.int64)
 
     def patch_faces(self, surface: Surface, faults: Ints) -> Iterator[Ints]:
         """Yield the faces as near to a pair as its longest edge, and all at the corners of its neighbours."""
@@ -91,4 +91,6 @@ class _NewIntersections:
         return np.asarray((~gone[:, pairs].any(axis=2)).sum(axis=1))
 
     def count_after(self, patch: Patch, change: Change, bound: int) -> int:
-        return len(self_intersections(Surface(*apply_changes(patch.surface, [change]))))
+        others = np.delete(patch.surface.faces, change.gone, axis=0)
+        faces = np.concatenate([others, change.new.astype(np.int32)])
+        return bound + count_intersections_from(len(others), change.points_after(patch.surface.points), faces)
