@@ -55,7 +55,7 @@ def test_killed_at_any_moment_the_old_file_or_the_whole_new_one_is_there(torus_o
     whole, n_new = time.perf_counter() - start, load(out).n_points
     old = torus_obj.read_bytes()
     done = 0
-    for share in (0.2, 0.5, 0.8, 0.9, 0.94, 0.97, 1.0, 1.03):
+    for share in (0.3, 0.8, 0.94, 1.0, 1.03):
         out.write_bytes(old)
         process = subprocess.Popen(words)
         time.sleep(share * whole)
@@ -64,4 +64,4 @@ def test_killed_at_any_moment_the_old_file_or_the_whole_new_one_is_there(torus_o
         if out.read_bytes() != old:
             assert load(out).n_points == n_new
             done += 1
-    assert done < 8
+    assert done < 5

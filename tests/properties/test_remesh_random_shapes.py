@@ -16,11 +16,11 @@ pytestmark = pytest.mark.slow
 
 @pytest.mark.parametrize("make", SHAPES)
 @examples(8)
-@hypothesis.given(seed=st.integers(0, 2**32 - 1), size=st.floats(0.7, 2.6))
-def test_topology_holds_and_remaining_faults_are_reported(make, seed, size):
+@hypothesis.given(seed=st.integers(0, 2**32 - 1), size=st.floats(0.7, 2.1), embedding=st.sampled_from(["direct", "hybrid"]))
+def test_topology_holds_and_remaining_faults_are_reported(make, seed, size, embedding):
     surface = make(np.random.default_rng(seed))
     n = max(4, round(10**size))
-    result = remesh(surface, n_vertices=n, seed=seed, max_iterations=15)
+    result = remesh(surface, n_vertices=n, seed=seed, embedding=embedding, max_iterations=15)
     new, old = result.surface, prepare(surface).surface
     assert topology.count_nonmanifold_edges(new.faces) == 0
     assert topology.count_nonmanifold_points(new.faces) == 0
