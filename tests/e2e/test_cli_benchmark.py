@@ -70,6 +70,7 @@ def test_smoke_suite_runs_and_ours_are_valid_and_in_the_order_of_the_paper(run_c
         assert normal_metric["shape"]["g_mean"] < plain["shape"]["g_mean"]
 
 
+@pytest.mark.slow
 def test_one_ratio_of_a_suite(run_cli, tmp_path):
     (tmp_path / "two.toml").write_text(TOML)
     done = run_cli("benchmark", tmp_path / "two.toml", "-o", tmp_path, "--ratio", 0.3, "--quiet")
@@ -167,6 +168,7 @@ def test_failures_and_missing_packages_are_rows(tmp_path, monkeypatch):
         assert "away (no_such_package not installed)" in report
 
 
+@pytest.mark.slow
 def test_open_and_broken_meshes_are_rows(tmp_path):
     folder = tmp_path / "data"
     folder.mkdir()

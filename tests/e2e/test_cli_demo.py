@@ -41,6 +41,7 @@ def test_demo_refuses_a_file_in_place_of_the_folder(run_cli, tmp_path):
     assert "taken is a file" in process.stderr
 
 
+@pytest.mark.slow
 def test_demo_goes_on_without_a_picture_where_none_can_be_drawn(run_cli, monkeypatch, tmp_path):
     find_spec = importlib.util.find_spec
     monkeypatch.setattr(importlib.util, "find_spec", lambda name: None if name == "pyvista" else find_spec(name))

@@ -61,6 +61,7 @@ def different(first, second):
     return float((np.abs(first - second).max(axis=2) > 30).mean())
 
 
+@pytest.mark.slow
 def test_a_result_is_drawn_beside_its_input_with_the_same_camera(figure):
     image = pixels(figure("result", "fine.obj", "fine.obj"))
     assert image.shape[1] == 1600
@@ -92,6 +93,7 @@ def test_remeshing_on_the_fly_can_show_the_cells(figure):
     assert len(np.unique(image[60:600, 1700:2300].reshape(-1, 3) // 32, axis=0)) > 10
 
 
+@pytest.mark.slow
 def test_the_summary_names_sizes_colour_and_file(drawing, meshes, tmp_path, run_cli):
     out = tmp_path / "out.png"
     words = ["figure", "result", meshes / "fine.obj", meshes / "coarse.obj", "--color", "stretch", "-o", out]
@@ -110,6 +112,7 @@ def test_a_pdf_is_one_page_with_text_and_the_same_each_time(figure):
     assert data == figure("result", "fine.obj", "coarse.obj", "--colour", "stretch", name="again.pdf").read_bytes()
 
 
+@pytest.mark.slow
 def test_scale_gives_more_pixels_of_the_same_picture(figure):
     small = Image.open(figure("gallery", "coarse.obj"))
     large = Image.open(figure("gallery", "coarse.obj", scale=2))
@@ -141,6 +144,7 @@ def test_a_gallery_is_a_grid_with_a_caption_under_each_mesh(figure, count, words
         assert number >= count or different(tile, tiles[0]) < 1e-3
 
 
+@pytest.mark.slow
 def test_meshes_fill_their_panels_unless_the_camera_is_the_same(figure):
     own = pixels(figure("gallery", "fine.obj", "long.obj"))
     same = pixels(figure("gallery", "fine.obj", "long.obj", "--same-view"))
@@ -169,6 +173,7 @@ def test_ratios_may_be_one_word_and_stand_before_the_mesh(figure):
     assert first.read_bytes() == second.read_bytes()
 
 
+@pytest.mark.slow
 def test_from_and_up_turn_the_camera(figure):
     front = pixels(figure("gallery", "long.obj", "--from", 0, -1, 0, "--up", "z"))
     side = pixels(figure("gallery", "long.obj", "--from", 0, -1, 0, "--up", "x"))

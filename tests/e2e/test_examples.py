@@ -30,6 +30,7 @@ def test_every_example_is_tested():
     assert {path.stem for path in FOLDER.glob("*.py")} == tested | tutorials
 
 
+@pytest.mark.slow
 def test_remesh_a_surface(tmp_path, capsys, torus_obj):
     result = example("remesh_a_surface").main(torus_obj, tmp_path, n_vertices=200)
     assert {path.name for path in tmp_path.iterdir()} == {"remeshed.ply", "remeshed.png"}
@@ -62,7 +63,7 @@ def test_gallery_draws_the_results(tmp_path, capsys):
 @pytest.mark.slow
 def test_noisy_scan_is_better_with_the_network(tmp_path, capsys):
     pytest.importorskip("torch")
-    example("noisy_scan").main(str(tmp_path / "noisy.png"))
+    example("noisy_scan").main(str(tmp_path / "noisy.png"), n_vertices=600)
     assert (tmp_path / "noisy.png").stat().st_size > 10_000
     direct, hybrid = (
         [float(word) for word in line.replace("e-4", "").replace(",", "").split() if word.replace(".", "").isdigit()]
@@ -97,12 +98,13 @@ def test_own_energy_makes_flat_triangles(tmp_path):
 
 @pytest.mark.slow
 def test_own_embedder_is_worse_in_the_metric_than_the_direct_one(tmp_path, capsys):
-    results = example("own_embedder").main(str(tmp_path / "embedder.png"), n_vertices=300)
+    results = example("own_embedder").main(str(tmp_path / "embedder.png"), n_vertices=200)
     assert [result.embedding.points.shape[1] for result in results] == [6, 6, 8]
     quality = [float(line.split("G ")[1].split()[0]) for line in capsys.readouterr().out.splitlines()]
     assert quality[2] == max(quality)
 
 
+@pytest.mark.slow
 def test_stages_make_a_valid_mesh_step_by_step(tmp_path, capsys):
     result = example("stages").main(str(tmp_path / "stages.png"), n_vertices=300)
     assert result.n_points == 300

@@ -16,6 +16,7 @@ def same(a, b):
     return np.array_equal(a.surface.points, b.surface.points) and np.array_equal(a.surface.faces, b.surface.faces)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("short", "long"),
     [
@@ -77,6 +78,7 @@ def test_an_embedder_of_ones_own_is_used():
     assert result.validity.closed
 
 
+@pytest.mark.slow
 def test_triangles_are_smaller_where_the_density_is_larger():
     flat = open_patch(lambda x, y: 0.0 * x, 20)
     density = np.where(flat.points[:, 0] > 0.0, 16.0, 1.0)

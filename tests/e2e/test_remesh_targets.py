@@ -30,7 +30,14 @@ def joined(a, b):
     return Surface(np.concatenate([a.points, b.points]), np.concatenate([a.faces, b.faces + a.n_points]))
 
 
-@pytest.mark.parametrize(("name", "n"), [(name, n) for name, (_, counts) in COUNTS.items() for n in counts])
+@pytest.mark.parametrize(
+    ("name", "n"),
+    [
+        pytest.param(name, n, marks=() if n == counts[0] else pytest.mark.slow)
+        for name, (_, counts) in COUNTS.items()
+        for n in counts
+    ],
+)
 def test_the_count_is_exact(name, n):
     result = anisomesh.remesh(COUNTS[name][0](), n_vertices=n, max_iterations=15)
     assert result.surface.n_points == n
@@ -51,12 +58,12 @@ def test_coinciding_sites_do_not_lower_the_count():
 @pytest.mark.parametrize("shape", [ellipsoid((2.0, 1.0, 0.5), 3), cad_part(6)], ids=["ellipsoid", "part"])
 def test_a_result_is_within_the_requested_error(shape, share):
     asked = share * shape.diagonal
-    result = anisomesh.remesh(shape, max_error=asked, max_iterations=20)
+    result = anisomesh.remesh(shape, max_error=asked, max_iterations=10)
     measured = surface_distance(shape, result.surface, 30_000, seed=5).hausdorff
     assert measured < 1.02 * asked
     assert result.distance <= asked
     assert result.distance == pytest.approx(measured, rel=0.1)
-    fewer = anisomesh.remesh(shape, n_vertices=int(0.6 * result.surface.n_points), max_iterations=20)
+    fewer = anisomesh.remesh(shape, n_vertices=int(0.6 * result.surface.n_points), max_iterations=10)
     assert surface_distance(shape, fewer.surface, 30_000).hausdorff > asked
 
 
@@ -139,14 +146,14 @@ def test_the_command_reads_the_edges_and_says_what_is_wrong_with_them(run_cli, t
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("text", ["0.02", "0.55%"])
+@pytest.mark.parametrize("text", ["0.04", "1.2%"])
 def test_the_command_searches_for_a_count(run_cli, tmp_path, torus_obj, text):
     done = run_cli("remesh", torus_obj, "-o", tmp_path / "out.ply", "--max-error", text, "--json", "--quiet")
     assert done.returncode == 0, done.stderr
     report = json.loads(done.stdout)
     result = anisomesh.load(tmp_path / "out.ply")
     assert report["vertices"] == result.n_points
-    limit = 0.02 if text == "0.02" else 0.0055 * anisomesh.load(torus_obj).diagonal
+    limit = 0.04 if text == "0.04" else 0.012 * anisomesh.load(torus_obj).diagonal
     assert 0.5 * limit < report["distance"] <= limit
 
 

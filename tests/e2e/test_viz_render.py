@@ -32,6 +32,7 @@ def draw(path, *arguments, **options):
     return pixels(path)
 
 
+@pytest.mark.slow
 def test_both_panels_have_the_same_camera(torus, tmp_path):
     image = draw(tmp_path / "a.png", torus, torus, titles=TITLES)
     assert image.shape == (1150, 1600, 3)
@@ -40,6 +41,7 @@ def test_both_panels_have_the_same_camera(torus, tmp_path):
     assert 0.2 < (image.min(axis=2) < 245).mean() < 0.95
 
 
+@pytest.mark.slow
 def test_the_right_panel_shows_the_result(torus, tmp_path):
     coarse = Surface(*torus_arrays(12, 6))
     image = draw(tmp_path / "a.png", torus, coarse, titles=TITLES)

@@ -91,6 +91,6 @@ def test_a_remesh_of_sheets_close_together_has_no_intersection(gap):
     """Coarse triangles on curved shells as near to each other as a few per cent of their edges."""
     outer = sphere(3)
     inner = Surface((1.0 - gap) * outer.points, outer.faces[:, ::-1])
-    result = remesh(both(outer, inner), n_vertices=200, max_iterations=30)
+    result = remesh(both(outer, inner), n_vertices=200, max_iterations=15)
     assert result.validity.new_intersections == 0
     assert result.validity.euler == 4

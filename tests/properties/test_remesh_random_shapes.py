@@ -16,7 +16,9 @@ pytestmark = pytest.mark.slow
 
 @pytest.mark.parametrize("make", SHAPES)
 @examples(8)
-@hypothesis.given(seed=st.integers(0, 2**32 - 1), size=st.floats(0.7, 2.1), embedding=st.sampled_from(["direct", "hybrid"]))
+@hypothesis.given(
+    seed=st.integers(0, 2**32 - 1), size=st.floats(0.7, 2.1), embedding=st.sampled_from(["direct", "hybrid"])
+)
 def test_topology_holds_and_remaining_faults_are_reported(make, seed, size, embedding):
     surface = make(np.random.default_rng(seed))
     n = max(4, round(10**size))

@@ -187,6 +187,7 @@ def test_many_small_steps_give_the_diagram_of_a_fresh_start():
     assert_same(used.diagram(sites), RestrictedVoronoi(embedded_surface(points, faces)).diagram(sites))
 
 
+@pytest.mark.slow
 @dimensions
 def test_many_more_sites_than_facets(dimension):
     rng = np.random.default_rng(8)
@@ -214,6 +215,7 @@ def test_clustered_sites(dimension, scale):
     assert_nearest(diagram, rng)
 
 
+@pytest.mark.slow
 @examples(25)
 @given(st.integers(0, 2**32), st.sampled_from([3, 6, 8]), st.integers(100, 400))
 def test_sites_at_all_scales_around_one_point(seed, dimension, n):

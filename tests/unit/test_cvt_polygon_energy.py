@@ -1,5 +1,7 @@
 """Energies from a function of a polygon: they agree with the closed form, and with differences where there is none."""
 
+from functools import cache
+
 import numba
 import numpy as np
 import pytest
@@ -23,13 +25,19 @@ SURFACES = {
 }
 
 
-@pytest.mark.parametrize("name", SURFACES)
-@pytest.mark.parametrize("weighted", [False, True])
+@cache
+def energies():
+    """Return the plain energy and the height spread, compiled once."""
+    return energy_from_kernel(plain), energy_from_kernel(height)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(("name", "weighted"), [("closed", True), ("open", False)])
 def test_the_closed_form_is_reproduced(name, weighted):
     surface = SURFACES[name]
     density = 0.5 + np.random.default_rng(3).random(surface.n_points) if weighted else None
     voronoi, sites = problem(surface, density)
-    parts = [energy_from_kernel(function).evaluate(voronoi, sites) for function in (plain, height)]
+    parts = [energy.evaluate(voronoi, sites) for energy in energies()]
     exact, sharp = voronoi.integrate(sites), voronoi.integrate(sites, 3.0)
     assert parts[0].value == pytest.approx(exact.value, rel=1e-12)
     np.testing.assert_allclose(parts[0].gradient, exact.gradient, atol=1e-9 * np.abs(exact.gradient).max())

@@ -128,6 +128,7 @@ def test_pairs_on_a_grid_match_exact_arithmetic(soup):
     assert self_intersections(soup).tolist() == naive_pairs(soup)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("image", [shift, turn, shear, shrink])
 @examples(20)
 @given(soup=soups(tops=(2, 5)))

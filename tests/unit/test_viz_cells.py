@@ -31,6 +31,7 @@ def test_two_halves_have_their_own_rims(shared):
     assert lengths.sum() == pytest.approx(2 * (2 * n + 2 * n / 2))
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("seed", range(3))
 def test_the_outline_of_real_cells_is_closed_and_shared_by_two_cells(seed):
     surface = Surface(*torus_arrays(24, 12))

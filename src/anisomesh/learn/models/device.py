@@ -44,9 +44,10 @@ def deterministic() -> Iterator[None]:
 
     On a GPU torch warns about operations without such an algorithm.
     """
-    before = torch.are_deterministic_algorithms_enabled()
-    torch.use_deterministic_algorithms(True, warn_only=torch.cuda.is_available())
+    before = torch.get_deterministic_debug_mode()
+    # torch.use_deterministic_algorithms does the same, but first imports the compiler of torch, for seconds
+    torch.set_deterministic_debug_mode("warn" if torch.cuda.is_available() else "error")
     try:
         yield
     finally:
-        torch.use_deterministic_algorithms(before)
+        torch.set_deterministic_debug_mode(before)
