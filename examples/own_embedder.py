@@ -9,7 +9,6 @@ import sys
 from dataclasses import dataclass
 
 import anisomesh
-from anisomesh.embedding.precomputed import precomputed_embedding
 from anisomesh.viz import Panel, PictureOptions, gallery, stretch_colouring
 
 
@@ -27,7 +26,7 @@ class Normals:
 
     def __call__(self, surface: anisomesh.Surface, field: anisomesh.MetricField) -> anisomesh.Embedding:
         """Return the embedding of a surface; the metric counts only in the statistics of the stretch."""
-        return precomputed_embedding(surface, self.factor * surface.point_normals, field.tensors)
+        return anisomesh.precomputed_embedding(surface, self.factor * surface.point_normals, field.tensors)
 
 
 def main(out: str = "own_embedder.png", n_vertices: int = 700) -> list[anisomesh.RemeshResult]:

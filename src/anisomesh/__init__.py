@@ -20,6 +20,7 @@ if TYPE_CHECKING:
     from anisomesh.delaunay.meshing import MeshingTask, mesh_from_sites
     from anisomesh.embedding.base import Embedding
     from anisomesh.embedding.embedder import Direct
+    from anisomesh.embedding.precomputed import precomputed_embedding
     from anisomesh.errors import AnisomeshError, MeshError, MeshFileError, MetricError, OptionError
     from anisomesh.evaluation.report import Evaluation, evaluate
     from anisomesh.features.network import trace_features
@@ -65,6 +66,7 @@ _MODULE_OF = {
     "Hybrid": "learn.inference.source",
     "Embedding": "embedding.base",
     "Direct": "embedding.embedder",
+    "precomputed_embedding": "embedding.precomputed",
     "EmbeddedSurface": "voronoi.embedded_surface",
     "RestrictedVoronoi": "voronoi.restricted",
     "trace_features": "features.network",

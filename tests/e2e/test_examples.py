@@ -63,7 +63,7 @@ def test_gallery_draws_the_results(tmp_path, capsys):
 @pytest.mark.slow
 def test_noisy_scan_is_better_with_the_network(tmp_path, capsys):
     pytest.importorskip("torch")
-    example("noisy_scan").main(str(tmp_path / "noisy.png"), n_vertices=600)
+    example("noisy_scan").main(str(tmp_path / "noisy.png"))
     assert (tmp_path / "noisy.png").stat().st_size > 10_000
     direct, hybrid = (
         [float(word) for word in line.replace("e-4", "").replace(",", "").split() if word.replace(".", "").isdigit()]

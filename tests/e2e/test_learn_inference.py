@@ -1,5 +1,7 @@
 """Remeshing with the pretrained networks."""
 
+import subprocess
+import sys
 from functools import cache
 
 import numpy as np
@@ -48,6 +50,18 @@ def test_the_default_network_is_there_and_says_what_it_is():
     assert network.options.scales >= 3
     assert {"epoch", "validation 0", "training"} <= set(facts)
     assert weights_path("default") == weights_path(None)
+
+
+@pytest.mark.slow
+def test_a_prediction_does_not_import_the_compiler_of_torch():
+    """Regression: choosing deterministic algorithms imported it, which took 3 s of the first remesh of a process."""
+    code = (
+        "import sys; from anisomesh.learn.inference.predict import predict\n"
+        "from anisomesh.shapes.analytic import sphere\n"
+        "ball = sphere(2); predict(ball.with_points(ball.points / ball.diagonal))\n"
+        "assert 'torch' in sys.modules and 'torch._inductor' not in sys.modules"
+    )
+    subprocess.run([sys.executable, "-c", code], check=True)
 
 
 @pytest.mark.slow

@@ -48,6 +48,7 @@ def test_the_closed_form_is_reproduced(name, weighted):
     np.testing.assert_allclose(sharp_gradient, sharp.gradient, atol=1e-9 * np.abs(sharp.gradient).max())
 
 
+@pytest.mark.slow
 def test_a_gradient_without_closed_form_agrees_with_differences():
     @numba.njit
     def perimeter(vertices, site, normal, vertex_gradient, site_gradient):

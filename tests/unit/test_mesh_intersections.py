@@ -9,7 +9,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from anisomesh._kernels import orientation
-from anisomesh.mesh.intersections import self_intersections
+from anisomesh.mesh.intersections import count_intersections_from, self_intersections
 from anisomesh.mesh.surface import Surface
 from anisomesh.shapes.analytic import box, cylinder, open_patch, sphere, torus
 from conftest import examples
@@ -160,6 +160,14 @@ def test_pairs_do_not_depend_on_order_scale_or_axes(soup, random, exponent):
     signs = np.array([random.choice([1.0, -1.0]) for _ in axes])
     image = soup.with_points(np.ldexp(soup.points, exponent)[:, axes] * signs)
     assert self_intersections(image).tolist() == pairs.tolist()
+
+
+@examples(50)
+@given(soups(), st.integers(0, 20))
+def test_pairs_with_the_last_faces_are_counted_as_they_are_found(soup, last):
+    first = max(0, soup.n_faces - last)
+    wanted = np.count_nonzero(self_intersections(soup).max(axis=1, initial=-1) >= first)
+    assert count_intersections_from(first, soup.points, soup.faces) == wanted
 
 
 A, B, C = [0, 0, 0], [4, 0, 0], [0, 4, 0]  # the first of two triangles
