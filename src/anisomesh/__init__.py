@@ -125,6 +125,7 @@ __all__ = [
     "load",
     "mesh_from_sites",
     "optimise_sites",
+    "precomputed_embedding",
     "prepare",
     "remesh",
     "sample",
