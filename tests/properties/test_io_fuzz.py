@@ -83,7 +83,7 @@ def test_damaged_files(kind, tmp_path, capfd):
     try:
         for case in range(CASES):
             path.write_bytes(damaged(data, rng))
-            if case % 4 == 0:  # tracing allocations doubles the time
+            if case % 4 == 0:  # tracing takes longer than reading
                 tracemalloc.start()
             start = time.process_time()
             try:

@@ -33,7 +33,7 @@ def test_decimation_reaches_the_number_and_keeps_topology_and_side(name, share):
     result = Surface(points, faces)
     assert result.n_points == n
     assert_same_topology(result, surface)
-    assert not inverted_faces(result, surface).any()
+    assert not inverted_faces(result, ClosestPoints(surface)).any()
     known = {tuple(point) for point in surface.points.tolist()}
     assert all(tuple(point) in known for point in points.tolist())
 
@@ -90,11 +90,11 @@ def test_inverted_triangles_are_removed(name, seed):
     for u, v in edges.tolist():
         points[u] += 1.6 * (points[v] - points[u])  # over the neighbour and beyond
     folded = Surface(points, surface.faces)
-    assert inverted_faces(folded, surface).any()
+    assert inverted_faces(folded, ClosestPoints(surface)).any()
     mended_points, faces, left = remove_inverted_triangles(folded.points, folded.faces, ClosestPoints(surface))
     mended = Surface(mended_points, faces)
     assert left == 0
-    assert not inverted_faces(mended, surface).any()
+    assert not inverted_faces(mended, ClosestPoints(surface)).any()
     assert_same_topology(mended, surface)
 
 
@@ -136,7 +136,7 @@ def test_decimation_of_a_square_tube_leaves_no_needle_and_no_inverted_face():
     assert_same_topology(result, surface)
     assert result.n_points < 0.9 * surface.n_points
     assert thickness(points[faces]).min() >= 1e-3
-    assert not inverted_faces(result, surface).any()
+    assert not inverted_faces(result, ClosestPoints(surface)).any()
 
 
 def cubes_boundary(cubes):
@@ -183,7 +183,7 @@ def test_splits_reach_the_number_on_the_surface_and_keep_topology_and_side(name)
     np.testing.assert_array_equal(grown[: len(points)], points)
     result = Surface(grown, new_faces)
     assert_same_topology(result, surface)
-    assert inverted_faces(result, surface).sum() == 0
+    assert inverted_faces(result, ClosestPoints(surface)).sum() == 0
     inner = np.arange(len(points), n)[~result.on_boundary[len(points) :]]
     assert np.sqrt(reference.squared_distances(grown[inner])).max() < 1e-9
     assert split_longest_edges(points, faces, len(points), reference, roots)[0] is points

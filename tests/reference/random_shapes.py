@@ -13,7 +13,7 @@ def sheet(rng):
 
 def nearly_touching(rng):
     """Return two waves, the upper side of one next to the lower side of the other."""
-    wave = open_patch(lambda x, y: 0.1 * np.sin(3 * x), n=int(rng.integers(4, 10)))
+    wave = open_patch(lambda x, y: 0.1 * np.sin(3 * x), n=int(rng.integers(4, 16)))
     other = wave.points + np.array([0.0, 0.0, 10 ** rng.uniform(-4, -1)])
     return Surface(
         np.concatenate([wave.points, other]), np.concatenate([wave.faces, wave.faces[:, ::-1] + wave.n_points])

@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 from creases import wedge
 
+from anisomesh.mesh.closest_points import ClosestPoints
 from anisomesh.mesh.surface import Surface
 from anisomesh.mesh.validity import check_validity, inverted_faces
 from anisomesh.shapes.analytic import box, cylinder, ellipsoid, sphere, torus
@@ -75,8 +76,8 @@ def test_values_can_be_written_as_json():
     ids=["sphere", "icosahedron", "thin", "torus", "box"],
 )
 def test_coarse_remesh_has_no_inverted_triangle_and_its_reverse_nothing_else(coarse, fine):
-    assert not inverted_faces(coarse, fine).any()
-    assert inverted_faces(with_faces(coarse, coarse.faces[:, ::-1]), fine).all()
+    assert not inverted_faces(coarse, ClosestPoints(fine)).any()
+    assert inverted_faces(with_faces(coarse, coarse.faces[:, ::-1]), ClosestPoints(fine)).all()
 
 
 @pytest.mark.parametrize("degrees", [10, 40, 90, 150])
@@ -85,8 +86,8 @@ def test_triangles_of_a_blunt_crest_are_not_inverted(degrees):
     roof = wedge(np.radians(degrees))
     assert roof.face_normals[:, 2].min() > 0
     strip = Surface(np.array([[-0.01, 0, 0.01], [0.01, 0, 0.01], [0, 0.1, 0.01]]), np.array([[0, 1, 2]]))
-    assert not inverted_faces(strip, roof).any()
-    assert inverted_faces(with_faces(strip, strip.faces[:, ::-1]), roof).all()
+    assert not inverted_faces(strip, ClosestPoints(roof)).any()
+    assert inverted_faces(with_faces(strip, strip.faces[:, ::-1]), ClosestPoints(roof)).all()
 
 
 @pytest.mark.parametrize("degrees", [10, 90])
@@ -100,7 +101,7 @@ def test_facets_on_either_side_of_a_crest_are_equally_good(degrees):
         points = np.stack([-across, across, [0.0, 1, 0]]) * 0.01 + 0.05 * np.array([0, 0, 1.0])
         steep = Surface(points, np.array([[0, 1, 2]]))
         np.testing.assert_allclose(steep.face_normals[0], normal, atol=1e-12)
-        assert not inverted_faces(steep, roof).any()
+        assert not inverted_faces(steep, ClosestPoints(roof)).any()
 
 
 @pytest.mark.parametrize("size", [1e-9, 1.0, 1e9])
@@ -108,7 +109,7 @@ def test_triangle_without_area_is_flat_and_not_inverted(size):
     ball = sphere(2)
     line = Surface(size * np.array([[1.0, 0, 0], [1, 0.1, 0], [1, 0.2, 0]]), np.array([[0, 1, 2]]))
     ball = ball.with_points(size * ball.points)
-    assert not inverted_faces(line, ball).any()
+    assert not inverted_faces(line, ClosestPoints(ball)).any()
     validity = check_validity(line, ball)
     assert (validity.flat, validity.inverted) == (1, 0)
     assert check_validity(ball, ball).flat == 0

@@ -13,7 +13,7 @@ order, and is row ``2**l - 1 + m`` of ``nodes``.
 
 import numpy as np
 
-from .compiled import allocating, inlined, kernel
+from .compiled import inlined, kernel
 from .orientation import orient2d, orient3d
 
 
@@ -271,31 +271,21 @@ def find_pairs(begin, points, faces, axes, boxes, slabs, nodes, depth, stack, pa
     return n, written
 
 
-@allocating
-def count_pairs_from(first, points, faces, axes):
+@kernel
+def count_pairs_from(first, points, faces, axes, boxes):
     """Return the number of intersecting pairs of which one face has the number ``first`` or a higher one.
 
     Every such face is compared with all before it, which suits a few among some hundred faces. Faces (F, 3) with a
-    negative axis (F,) are ignored.
+    negative axis (F,) are ignored; boxes (F, 6) need not be in the order of a tree.
     """
     count = 0
-    low = np.empty(3)
-    high = np.empty(3)
     for face in range(first, len(faces)):
-        if axes[face] < 0:
-            continue
-        for x in range(3):
-            low[x] = min(points[faces[face, 0], x], points[faces[face, 1], x], points[faces[face, 2], x])
-            high[x] = max(points[faces[face, 0], x], points[faces[face, 1], x], points[faces[face, 2], x])
         for other in range(face):
-            if axes[other] < 0:
-                continue
-            apart = False
-            for x in range(3):
-                p = points[faces[other, 0], x]
-                q = points[faces[other, 1], x]
-                r = points[faces[other, 2], x]
-                apart = apart or min(p, q, r) > high[x] or max(p, q, r) < low[x]
-            if not apart and faces_intersect(points, faces, axes, face, other):
+            if (
+                axes[face] >= 0
+                and axes[other] >= 0
+                and _overlap(boxes, face, boxes, other)
+                and faces_intersect(points, faces, axes, face, other)
+            ):
                 count += 1
     return count

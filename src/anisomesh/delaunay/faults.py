@@ -11,14 +11,15 @@ from anisomesh.delaunay.creases import MIN_SITE_DISTANCE
 from anisomesh.mesh.closest_points import ClosestPoints
 from anisomesh.mesh.geometry import is_flat
 from anisomesh.mesh.surface import Surface
-from anisomesh.mesh.validity import new_intersections
+from anisomesh.mesh.validity import inverted_faces, new_intersections
 from anisomesh.voronoi.embedded_surface import EmbeddedSurface
 
 
 def faulty_faces(points: Points, faces: Faces, reference: ClosestPoints) -> npt.NDArray[np.int64]:
     """Return the faces (n,) that have no area, are inverted against the reference, or intersect where it does not."""
-    bad = np.flatnonzero(is_flat(points[faces]) | reference.inverted(points[faces]))
-    return np.union1d(bad, new_intersections(Surface(points, faces), reference))
+    mesh = Surface(points, faces)
+    bad = np.flatnonzero(is_flat(points[faces]) | inverted_faces(mesh, reference))
+    return np.union1d(bad, new_intersections(mesh, reference))
 
 
 def points_at_faults(

@@ -99,7 +99,7 @@ def check_validity(result: Surface, reference: Surface) -> Validity:
         nonmanifold_vertices=count_nonmanifold_points(result.faces),
         oriented=is_oriented(result.faces),
         flat=int(is_flat(result.points[result.faces]).sum()),
-        inverted=int(closest.inverted(result.points[result.faces]).sum()),
+        inverted=int(inverted_faces(result, closest).sum()),
         self_intersections=len(self_intersections(result)),
         self_intersections_input=len(closest.intersecting_pairs),
         new_intersections=len(new_intersections(result, closest)),
@@ -122,7 +122,7 @@ def new_intersections(result: Surface, reference: ClosestPoints) -> Pairs:
     return np.asarray(pairs[~near[position.reshape(-1, 2)].all(axis=1)])
 
 
-def inverted_faces(result: Surface, reference: Surface) -> FaceMask:
+def inverted_faces(result: Surface, reference: ClosestPoints) -> FaceMask:
     """Return which triangles (F,) of a remesh face away from its input.
 
     A triangle is inverted if its normal has a negative dot product with the pseudonormal of the input at the point
@@ -138,4 +138,4 @@ def inverted_faces(result: Surface, reference: Surface) -> FaceMask:
     ----------
     Baerentzen, Aanaes, "Signed distance computation using the angle weighted pseudonormal", 2005.
     """
-    return ClosestPoints(reference).inverted(result.points[result.faces])
+    return reference.inverted(result.points[result.faces])

@@ -17,7 +17,7 @@ from anisomesh.meshops.change import Change, Ints, Patch, apply_changes
 
 _FACES_PER_TRY = 100  # a patch of more faces counts for several tries
 _MAX_PATCH = 2_000  # faces of a patch; in a larger one the mesh is crumpled, and every try takes long
-_MIN_THICKNESS = 1e-3  # area over squared longest side of a triangle that a change may make
+MIN_THICKNESS = 1e-3  # area over squared longest side of a triangle that a change may make
 
 _PLATEAU = -1  # number of the source of plateau changes
 
@@ -188,7 +188,7 @@ class _Search:
 def _best_change(patch: Patch, source: Candidates, objective: Objective, *, allow_equal: bool) -> Change | None:
     """Return the sound change that leaves the fewest faults on a patch, fewer than there are (or as many), or None.
 
-    Of several the source's first.
+    Among equally good changes it is the first of the source.
     """
     least, best = objective.count(patch) + int(allow_equal), -1
     changes = list(source(patch))
@@ -208,7 +208,7 @@ def is_sound(patch: Patch, change: Change) -> bool:
     Not more of them, that is, than it takes away.
     """
     old, new = patch.corners[change.gone], change.corners(patch.surface.points)
-    if geometry.thickness(new).min() < min(_MIN_THICKNESS, geometry.thickness(old).min()):
+    if geometry.thickness(new).min() < min(MIN_THICKNESS, geometry.thickness(old).min()):
         return False
     if not patch.keeps_topology(change):
         return False

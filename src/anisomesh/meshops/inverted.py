@@ -13,7 +13,7 @@ from anisomesh.mesh.closest_points import ClosestPoints
 from anisomesh.mesh.surface import Surface
 from anisomesh.meshops import candidates
 from anisomesh.meshops.change import Change, Ints, Patch, faces_beside
-from anisomesh.meshops.engine import Strategy, remove_faults
+from anisomesh.meshops.engine import MIN_THICKNESS, Strategy, remove_faults
 from anisomesh.meshops.flip import do_flips, possible_flips
 
 MAX_INVERSION_ROUNDS = 100  # heuristic: hard training meshes take about 70
@@ -42,8 +42,8 @@ def remove_inverted_triangles(
 
     Notes
     -----
-    Flips come first, all that lower the number of inverted triangles at once; the rest is left to
-    :func:`~anisomesh.meshops.engine.remove_faults`.
+    First all edges are flipped whose flip lowers the number of inverted triangles; the rest is left to
+    :func:`~anisomesh.meshops.engine.remove_faults`, which tries one triangle after the other.
     """
     faces = _flip_inverted(points, faces, reference)
     rng = np.random.default_rng(0)
@@ -69,16 +69,23 @@ def remove_inverted_triangles(
 
 
 def _flip_inverted(points: Points, faces: Faces, reference: ClosestPoints) -> Faces:
-    """Return the faces (F, 3) after flips that lower the number of inverted triangles, until there are no more."""
+    """Return the faces (F, 3) after flips, as long as any lowers the number of inverted triangles.
+
+    As in the engine, no flip makes a thin triangle, unless it takes away a thinner one.
+    """
     while True:
         surface = Surface(points, faces)
         inverted = reference.inverted(points[faces])
         flips = possible_flips(surface, np.unique(surface.face_edges[inverted]))
         corners = points[flips.triangles].reshape(-1, 3, 3)
         gain = inverted[flips.pair].sum(axis=1) - reference.inverted(corners).reshape(-1, 2).sum(axis=1)
-        thinnest = geometry.thickness(corners).reshape(-1, 2).min(axis=1)
-        order = np.lexsort((-thinnest, -gain))
-        order = order[(gain > 0)[order]]
+        before, after = (
+            geometry.thickness(points[triangles].reshape(-1, 3, 3)).reshape(-1, 2).min(axis=1)
+            for triangles in (faces[flips.pair], flips.triangles)
+        )
+        sound = after >= np.minimum(MIN_THICKNESS, before)
+        order = np.lexsort((-after, -gain))
+        order = order[((gain > 0) & sound)[order]]
         if len(order) == 0:
             return faces
         faces = do_flips(surface, flips, order)

@@ -10,7 +10,7 @@ import numpy as np
 from anisomesh._arrays import Faces, Points
 from anisomesh.deadline import NO_DEADLINE, Deadline
 from anisomesh.mesh.closest_points import ClosestPoints
-from anisomesh.mesh.intersections import count_intersections_from, self_intersections
+from anisomesh.mesh.intersections import count_intersections_from
 from anisomesh.mesh.surface import Surface
 from anisomesh.mesh.validity import new_intersections
 from anisomesh.meshops import candidates
@@ -46,8 +46,6 @@ def remove_self_intersections(
     -----
     See :func:`~anisomesh.meshops.engine.remove_faults`.
     """
-    if len(self_intersections(Surface(points, faces))) == 0:
-        return points, faces, 0  # most often, and without a search for intersections of the reference
     strategy = Strategy(
         candidates=(_changes, candidates.nudges, candidates.smoothing),
         plateau=candidates.edge_splits,

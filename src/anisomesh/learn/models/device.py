@@ -45,7 +45,7 @@ def deterministic() -> Iterator[None]:
     On a GPU torch warns about operations without such an algorithm.
     """
     before = torch.get_deterministic_debug_mode()
-    # torch.use_deterministic_algorithms does the same, but first imports the compiler of torch, for seconds
+    # torch.use_deterministic_algorithms also imports the compiler of torch, which takes seconds
     torch.set_deterministic_debug_mode("warn" if torch.cuda.is_available() else "error")
     try:
         yield
