@@ -24,6 +24,7 @@ FaceLabels = Int32[np.ndarray, "F"]
 FaceMask = Bool[np.ndarray, "F"]
 PointMask = Bool[np.ndarray, "V"]
 EdgeMask = Bool[np.ndarray, "E"]
+EdgeLabels = Int32[np.ndarray, "E"]
 
 EmbeddedPoints = Float64[np.ndarray, "V d"]
 Sites = Float64[np.ndarray, "S d"]

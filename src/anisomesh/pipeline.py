@@ -22,7 +22,7 @@ from anisomesh.embedding.embedder import checked_embedding
 from anisomesh.errors import MetricError, OptionError, TimeLimitError
 from anisomesh.features.detect import sharp_edges
 from anisomesh.features.network import FeatureNetwork, trace_features
-from anisomesh.features.tagged import edges_within, tagged_edges
+from anisomesh.features.tagged import tagged_edges
 from anisomesh.io.convert import as_surface
 from anisomesh.memory import check_memory
 from anisomesh.mesh.geometry import unit_frame
@@ -39,6 +39,7 @@ from anisomesh.search import MIN_VERTICES, smallest_within
 from anisomesh.voronoi.embedded_surface import EmbeddedSurface
 from anisomesh.voronoi.restricted import RestrictedVoronoi
 
+WEAK_ANGLE = 20.0  # degrees; edges this sharp stay in the working surface, weak features among them; heuristic
 OPTIMISATION_SHARE = 0.6  # of the time limit, for everything up to the end of the optimisation
 
 
@@ -156,7 +157,8 @@ def _remesh(source: _Input, n: int, options: RemeshOptions, run: _Run) -> Remesh
     with run.stage("prepare"):
         frame = unit_frame(prepared.surface.points)
         surface = prepared.surface.with_points(frame.to_unit(prepared.surface.points))
-        split = working_surface(surface, n)
+        creases = sharp_edges(surface, min(options.feature_angle, WEAK_ANGLE))
+        split = working_surface(surface, n, creases=creases, tagged=source.tagged)
         check_memory(n, split.surface.n_faces)
     with run.stage("metric"):
         tensors = None if source.tensors is None else split.interpolate(source.tensors * frame.scale**2)
@@ -172,7 +174,7 @@ def _remesh(source: _Input, n: int, options: RemeshOptions, run: _Run) -> Remesh
         density = None if source.density is None else split.interpolate(source.density)
         embedded = EmbeddedSurface(working, embedding.points, embedding.scale, density)
         voronoi = RestrictedVoronoi(embedded, threads=options.threads)
-        features = _features(embedded, n, edges_within(split, surface, source.tagged), options)
+        features = _features(embedded, n, split.tagged, options)
         optimised = optimise_sites(
             voronoi,
             n,

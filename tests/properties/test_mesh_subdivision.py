@@ -7,7 +7,7 @@ from hypothesis import strategies as st
 
 from anisomesh.errors import OptionError
 from anisomesh.mesh import topology
-from anisomesh.mesh.subdivision import split_long_edges
+from anisomesh.mesh.subdivision import edges_within, split_long_edges
 from anisomesh.mesh.surface import Surface
 from anisomesh.shapes import analytic as shapes
 from conftest import examples
@@ -102,3 +102,21 @@ def test_short_edges_are_kept_and_the_longest_are_split_first():
 def test_impossible_wishes_are_refused(arguments):
     with pytest.raises(OptionError, match="max_"):
         split_long_edges(CLOSED["box"], arguments[0], max_faces=arguments[1])
+
+
+@pytest.mark.parametrize("length", [10.0, 0.4, 0.11])
+def test_pieces_of_a_split_edge_are_those_that_lie_in_it(length):
+    part = shapes.box((2.0, 1.0, 0.3), n=2)
+    rng = np.random.default_rng(0)
+    tagged = rng.random(len(part.edges)) < 0.2
+    refined = split_long_edges(part, length, max_faces=100_000)
+    pieces = edges_within(refined, part, tagged)
+    fine = refined.surface
+    a, b = (part.points[part.edges[tagged][:, k]] for k in (0, 1))
+    way = b - a
+    for place in (0, 1):
+        ends = fine.points[fine.edges[pieces][:, place]]
+        share = np.clip(np.einsum("nex,ex->ne", ends[:, None] - a, way) / (way**2).sum(axis=1), 0.0, 1.0)
+        off = np.linalg.norm(a + share[:, :, None] * way - ends[:, None], axis=2)
+        assert off.min(axis=1).max() < 1e-12
+    assert fine.edge_lengths[pieces].sum() == pytest.approx(part.edge_lengths[tagged].sum())

@@ -1,14 +1,13 @@
-"""Edges tagged by the user: mapped through repair and subdivision; invalid edges are refused."""
+"""Edges tagged by the user: mapped through repair; invalid edges are refused."""
 
 import numpy as np
 import pytest
 
 from anisomesh.errors import MeshFileError, OptionError
-from anisomesh.features.tagged import edges_within, load_pairs, tagged_edges
-from anisomesh.mesh.subdivision import split_long_edges
+from anisomesh.features.tagged import load_pairs, tagged_edges
 from anisomesh.mesh.surface import Surface
 from anisomesh.repair.prepare import prepare
-from anisomesh.shapes.analytic import box, open_patch
+from anisomesh.shapes.analytic import open_patch
 
 
 def grid(n=4):
@@ -46,24 +45,6 @@ def test_edges_are_found_again_in_a_soup_that_was_welded_and_renumbered():
     assert prepared.n_points == surface.n_points
     found = tagged_edges(soup, soup.edges[along], prepared, 0.0)
     assert ends_of(prepared, found) == ends_of(surface, wanted)
-
-
-@pytest.mark.parametrize("length", [10.0, 0.4, 0.11])
-def test_pieces_of_a_split_edge_are_those_that_lie_in_it(length):
-    part = box((2.0, 1.0, 0.3), n=2)
-    rng = np.random.default_rng(0)
-    tagged = rng.random(len(part.edges)) < 0.2
-    refined = split_long_edges(part, length, max_faces=100_000)
-    pieces = edges_within(refined, part, tagged)
-    fine = refined.surface
-    a, b = (part.points[part.edges[tagged][:, k]] for k in (0, 1))
-    way = b - a
-    for place in (0, 1):
-        ends = fine.points[fine.edges[pieces][:, place]]
-        share = np.clip(np.einsum("nex,ex->ne", ends[:, None] - a, way) / (way**2).sum(axis=1), 0.0, 1.0)
-        off = np.linalg.norm(a + share[:, :, None] * way - ends[:, None], axis=2)
-        assert off.min(axis=1).max() < 1e-12
-    assert fine.edge_lengths[pieces].sum() == pytest.approx(part.edge_lengths[tagged].sum())
 
 
 @pytest.mark.parametrize(

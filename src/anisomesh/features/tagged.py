@@ -1,4 +1,4 @@
-"""Tagged edges: features that the user lists, found again on the prepared and the subdivided surface."""
+"""Tagged edges: features that the user lists, found again on the prepared surface."""
 
 from __future__ import annotations
 
@@ -12,7 +12,6 @@ from scipy.spatial import cKDTree
 
 from anisomesh._arrays import EdgeMask
 from anisomesh.errors import MeshFileError, OptionError
-from anisomesh.mesh.subdivision import Subdivision
 from anisomesh.mesh.surface import Surface
 from anisomesh.mesh.topology import edge_keys
 
@@ -76,28 +75,6 @@ def tagged_edges(input_mesh: Surface, pairs: npt.ArrayLike, prepared: Surface, t
     if wanted:
         found = np.isin(keys, edge_keys(np.array(wanted, dtype=np.int64)))
     return found
-
-
-def edges_within(subdivision: Subdivision, parent: Surface, tagged: EdgeMask) -> EdgeMask:
-    """Return which edges (E',) of a subdivided surface are parts of tagged edges (E,) of its parent.
-
-    Notes
-    -----
-    A point lies on an edge of the parent if at most two distinct corners have positive weight. An edge is a part of
-    an edge of the parent if both its ends lie on it.
-    """
-    used = subdivision.barycentric > 0.0
-    some = subdivision.point_corners[np.arange(len(used)), used.argmax(axis=1)]
-    corners = np.where(used, subdivision.point_corners, some[:, None])
-    low, high = corners.min(axis=1), corners.max(axis=1)
-    middle = corners.sum(axis=1) - low - high
-    on_edge = (middle == low) | (middle == high)
-    a, b = subdivision.surface.edges.T
-    ends = np.stack([np.minimum(low[a], low[b]), np.maximum(high[a], high[b])], axis=1)
-    fits = on_edge[a] & on_edge[b]
-    for end in (a, b):
-        fits &= (low[end, None] == ends).any(axis=1) & (high[end, None] == ends).any(axis=1)
-    return np.asarray(fits & np.isin(edge_keys(ends), edge_keys(parent.edges[tagged])))
 
 
 def _checked_pairs(input_mesh: Surface, pairs: npt.ArrayLike) -> npt.NDArray[np.int64]:

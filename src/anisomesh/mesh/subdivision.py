@@ -11,6 +11,7 @@ import numpy.typing as npt
 from anisomesh._arrays import EdgeMask, FaceIndices, FaceLabels
 from anisomesh.errors import OptionError
 from anisomesh.mesh.surface import Surface
+from anisomesh.mesh.topology import edge_keys
 
 logger = logging.getLogger(__name__)
 
@@ -100,6 +101,28 @@ def split_long_edges(surface: Surface, max_length: float, *, max_faces: int) -> 
     return Subdivision(
         surface=current, parent_face=parent, point_corners=point_corners, barycentric=barycentric, complete=complete
     )
+
+
+def edges_within(subdivision: Subdivision, parent: Surface, edges: EdgeMask) -> EdgeMask:
+    """Return which edges (E',) of a subdivided surface are parts of these edges (E,) of its parent.
+
+    Notes
+    -----
+    A point lies on an edge of the parent if at most two distinct corners have positive weight. An edge is a part of
+    an edge of the parent if both its ends lie on it.
+    """
+    used = subdivision.barycentric > 0.0
+    some = subdivision.point_corners[np.arange(len(used)), used.argmax(axis=1)]
+    corners = np.where(used, subdivision.point_corners, some[:, None])
+    low, high = corners.min(axis=1), corners.max(axis=1)
+    middle = corners.sum(axis=1) - low - high
+    on_edge = (middle == low) | (middle == high)
+    a, b = subdivision.surface.edges.T
+    ends = np.stack([np.minimum(low[a], low[b]), np.maximum(high[a], high[b])], axis=1)
+    fits = on_edge[a] & on_edge[b]
+    for end in (a, b):
+        fits &= (low[end, None] == ends).any(axis=1) & (high[end, None] == ends).any(axis=1)
+    return np.asarray(fits & np.isin(edge_keys(ends), edge_keys(parent.edges[edges])))
 
 
 def _edges_to_split(surface: Surface, max_length: float, budget: int) -> EdgeMask:

@@ -1,14 +1,19 @@
-"""The working surface of a remesh: the input surface, subdivided until its facets resolve the sites and the metric.
+"""The working surface of a remesh: the input surface with triangles that resolve the sites and the metric.
 
-The embedding is linear on every facet. On coarse input such as CAD, whose facets can be larger than the cells of many
-sites, the metric next to a crease would otherwise be averaged over the whole facet.
+The embedding is linear on every facet. On input such as CAD exports, facets can be larger than the cells of many sites,
+so that the metric next to a crease would be averaged over the whole facet, and slivers carry it across flat faces.
 """
 
 from __future__ import annotations
 
-import numpy as np
+from dataclasses import dataclass
 
-from anisomesh.mesh.subdivision import Subdivision, split_long_edges
+import numpy as np
+import numpy.typing as npt
+
+from anisomesh._arrays import EdgeMask
+from anisomesh.mesh.delaunay_refinement import Refinement, refine_slivers
+from anisomesh.mesh.subdivision import Subdivision, edges_within, split_long_edges
 from anisomesh.mesh.surface import Surface
 
 _MAX_EDGE_PER_SITE_DISTANCE = 1.6  # longest edge over the distance between evenly spread sites; heuristic
@@ -16,13 +21,66 @@ _METRIC_VERTICES = 5_000  # vertices of an even mesh that resolves the metric; t
 _MAX_EDGE_PER_METRIC_EDGE = 2.0  # longest edge over the edge length of that even mesh; heuristic
 _MAX_FACE_GROWTH = 8  # at most this many times the input's faces, or _MIN_FACE_LIMIT; bounds time and memory
 _MIN_FACE_LIMIT = 60_000  # faces
+_MAX_ASPECT = 4.0  # longest side over the height on it, above which a triangle is a sliver; heuristic
+_MIN_SLIVER_LENGTH = 0.7  # longest side, over the bound on edges, up to which slivers stay; heuristic
+_TOLERANCE = 0.1  # times squared distance of sites over the diagonal; heuristic, below the error to be expected
+
+_TAGGED = 2  # label of tagged edges, and 1 of other ones that are not flipped
 
 
-def working_surface(surface: Surface, n_vertices: int) -> Subdivision:
-    """Subdivide a surface for remeshing with ``n_vertices`` sites, as far as the limit on its faces allows."""
+@dataclass(frozen=True, kw_only=True, eq=False)
+class WorkingSurface:
+    """A working surface, and where its points come from.
+
+    Attributes
+    ----------
+    surface
+        The surface; its first V points are the points of the input, unchanged.
+    tagged
+        Which of its edges (E',) are parts of tagged edges.
+    """
+
+    surface: Surface
+    tagged: EdgeMask
+    _refinement: Refinement
+    _subdivision: Subdivision
+
+    def interpolate(self, values: npt.NDArray[np.float64]) -> npt.NDArray[np.float64]:
+        """Interpolate values (V, ...) at the points of the input linearly to all points (V', ...)."""
+        return self._subdivision.interpolate(self._refinement.interpolate(values))
+
+
+def working_surface(surface: Surface, n_vertices: int, *, creases: EdgeMask, tagged: EdgeMask) -> WorkingSurface:
+    """Return the surface without slivers and long edges, as far as the limit on its faces allows.
+
+    Parameters
+    ----------
+    surface
+        A manifold surface at bounding-box diagonal 1.
+    n_vertices
+        Number of sites for which it is made; the surface moves by no more than a tenth of the square of their distance.
+    creases, tagged
+        Edges (E,) that stay in place; tagged ones are found again in the result.
+    """
     site_distance, metric_edge = (_even_edge_length(surface.area, n) for n in (n_vertices, _METRIC_VERTICES))
     max_length = min(_MAX_EDGE_PER_SITE_DISTANCE * site_distance, _MAX_EDGE_PER_METRIC_EDGE * metric_edge)
-    return split_long_edges(surface, max_length, max_faces=max(_MAX_FACE_GROWTH * surface.n_faces, _MIN_FACE_LIMIT))
+    max_faces = max(_MAX_FACE_GROWTH * surface.n_faces, _MIN_FACE_LIMIT)
+    refinement = refine_slivers(
+        surface,
+        np.where(tagged, _TAGGED, creases).astype(np.int32),
+        max_aspect=_MAX_ASPECT,
+        min_length=_MIN_SLIVER_LENGTH * max_length,
+        tolerance=_TOLERANCE * site_distance**2,
+        max_faces=max_faces,
+    )
+    refined = refinement.surface
+    subdivision = split_long_edges(refined, max_length, max_faces=max(max_faces, refined.n_faces))
+    return WorkingSurface(
+        surface=subdivision.surface,
+        tagged=edges_within(subdivision, refined, refinement.labels == _TAGGED),
+        _refinement=refinement,
+        _subdivision=subdivision,
+    )
 
 
 def _even_edge_length(area: float, n_vertices: int) -> float:

@@ -198,7 +198,8 @@ def _input_items(surface: Surface, recipe: Recipe, rng: np.random.Generator) -> 
         return []
     surface = _in_unit_frame(surface)
     n_sites = round(surface.n_points * np.exp(rng.uniform(*np.log(_SITE_RANGE))))
-    working = working_surface(surface, n_sites).surface
+    none = np.zeros(len(surface.edges), dtype=bool)
+    working = working_surface(surface, n_sites, creases=none, tagged=none).surface
     if working.n_points > _MAX_INPUT_COUNT * recipe.target:
         return []
     curvature = principal_curvatures(working)

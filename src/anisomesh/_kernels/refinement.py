@@ -1,0 +1,282 @@
+"""Delaunay refinement of a triangle mesh: flips of edges within a tolerance, and splits of longest edges.
+
+The mesh is a :class:`Triangulation`, whose arrays have room for the faces and points that are added at their ends.
+Side i of a face is opposite its corner i.
+"""
+
+from math import sqrt
+from typing import Any, NamedTuple
+
+from .compiled import inlined, kernel
+
+_MIN_NORMAL_COSINE = 0.8  # between the normal of a new triangle and the area vector of the two; heuristic
+_DELAUNAY_MARGIN = 1e-9  # sine of the sum of the opposite angles that counts as zero, above rounding
+_LONGER = 1.0 + 1e-9  # ratio of squared lengths from which a side is longer: of equal sides, the path ends at the first
+
+
+class Triangulation(NamedTuple):
+    """A manifold triangle mesh that kernels change: faces, what is across their sides, and points.
+
+    Attributes
+    ----------
+    points, faces
+        Coordinates (n, 3) and corners (m, 3).
+    neighbours
+        The face across each side (m, 3), -1 at the boundary.
+    labels
+        A number for each side (m, 3), the same from both faces; sides of another number than 0 are not flipped.
+    parents
+        For points that are the middle of an edge, its ends (n, 2).
+    deviation
+        Bound on the distance of each face (m,) from the surface before all flips.
+    stack
+        Workspace (m,) for faces.
+    """
+
+    points: Any
+    faces: Any
+    neighbours: Any
+    labels: Any
+    parents: Any
+    deviation: Any
+    stack: Any
+
+
+@inlined
+def _difference(points, p, q):
+    """Return the vector from point q to point p."""
+    return points[p, 0] - points[q, 0], points[p, 1] - points[q, 1], points[p, 2] - points[q, 2]
+
+
+@inlined
+def _cross(u, v):
+    return u[1] * v[2] - u[2] * v[1], u[2] * v[0] - u[0] * v[2], u[0] * v[1] - u[1] * v[0]
+
+
+@inlined
+def _dot(u, v):
+    return u[0] * v[0] + u[1] * v[1] + u[2] * v[2]
+
+
+@inlined
+def _length(u):
+    return sqrt(_dot(u, u))
+
+
+@inlined
+def _write_row(table, row, values):
+    table[row, 0] = values[0]
+    table[row, 1] = values[1]
+    table[row, 2] = values[2]
+
+
+@inlined
+def _write_face(mesh, face, corners, neighbours, labels):
+    """Set the corners of a face, and neighbours and labels of the sides opposite them."""
+    _write_row(mesh.faces, face, corners)
+    _write_row(mesh.neighbours, face, neighbours)
+    _write_row(mesh.labels, face, labels)
+
+
+@kernel
+def _side_towards(mesh, face, neighbour):
+    """Return the side of a face across which a neighbour is."""
+    for side in range(3):
+        if mesh.neighbours[face, side] == neighbour:
+            return side
+    return -1
+
+
+@kernel
+def _replace_neighbour(mesh, face, old, new):
+    """Make a face the neighbour of another one in place of the old one; -1 is no face."""
+    if face >= 0:
+        mesh.neighbours[face, _side_towards(mesh, face, old)] = new
+
+
+@kernel
+def _area(mesh, face):
+    """Return the area of a face."""
+    a, b, c = mesh.faces[face, 0], mesh.faces[face, 1], mesh.faces[face, 2]
+    return 0.5 * _length(_cross(_difference(mesh.points, b, a), _difference(mesh.points, c, a)))
+
+
+@kernel
+def _longest_side(mesh, face):
+    """Return the longest side of a face, the first of equal ones, and its squared length."""
+    longest = -1.0
+    side = 0
+    for i in range(3):
+        along = _difference(mesh.points, mesh.faces[face, (i + 2) % 3], mesh.faces[face, (i + 1) % 3])
+        square = _dot(along, along)
+        if square > longest:
+            longest = square
+            side = i
+    return side, longest
+
+
+@kernel
+def _has_edge(mesh, face, corner, other):
+    """Return whether there is an edge from a corner of a face to another point."""
+    point = mesh.faces[face, corner]
+    for turn in range(1, 3):
+        current = face
+        while current >= 0:
+            i = 0
+            while mesh.faces[current, i] != point:
+                i += 1
+            if mesh.faces[current, (i + 1) % 3] == other or mesh.faces[current, (i + 2) % 3] == other:
+                return True
+            current = mesh.neighbours[current, (i + turn) % 3]
+            if current == face:
+                return False
+    return False
+
+
+@kernel
+def _flip_if_better(mesh, f, i, tolerance):
+    """Flip side i of a face if that makes it Delaunay, and return whether it was flipped.
+
+    Side x y of the triangles a x y and b y x becomes a b, if the angles at a and b add up to more than two right
+    angles, the deviation stays within the tolerance, no triangle turns far, and a b is not an edge yet. A flip moves
+    the surface by at most the distance between the lines a b and x y.
+    """
+    g = mesh.neighbours[f, i]
+    if g < 0 or mesh.labels[f, i] != 0:
+        return False
+    j = _side_towards(mesh, g, f)
+    fy, fx, gx, gy = (i + 1) % 3, (i + 2) % 3, (j + 1) % 3, (j + 2) % 3  # sides y a, a x, x b, b y
+    if mesh.neighbours[f, fy] == g or mesh.neighbours[f, fx] == g:
+        return False  # a has two faces only
+    a, x, y, b = mesh.faces[f, i], mesh.faces[f, fy], mesh.faces[f, fx], mesh.faces[g, j]
+    points = mesh.points
+    ax, ay = _difference(points, x, a), _difference(points, y, a)
+    bx, by = _difference(points, x, b), _difference(points, y, b)
+    area_f, area_g = _cross(ax, ay), _cross(by, bx)
+    sine = _length(area_f) * _dot(bx, by) + _length(area_g) * _dot(ax, ay)
+    if sine >= -_DELAUNAY_MARGIN * _length(ax) * _length(ay) * _length(bx) * _length(by):
+        return False
+    ab = _difference(points, b, a)
+    across = _cross(ab, _difference(points, y, x))
+    if _length(across) == 0.0:
+        return False
+    deviation = max(mesh.deviation[f], mesh.deviation[g]) + abs(_dot(ax, across)) / _length(across)
+    if deviation > tolerance:
+        return False
+    whole = (area_f[0] + area_g[0], area_f[1] + area_g[1], area_f[2] + area_g[2])
+    new_f, new_g = _cross(ax, ab), _cross(ab, ay)
+    least = _MIN_NORMAL_COSINE * _length(whole)
+    if _dot(new_f, whole) <= least * _length(new_f) or _dot(new_g, whole) <= least * _length(new_g):
+        return False
+    if _has_edge(mesh, f, i, b):
+        return False
+
+    across_ya, across_ax = mesh.neighbours[f, fy], mesh.neighbours[f, fx]
+    across_xb, across_by = mesh.neighbours[g, gx], mesh.neighbours[g, gy]
+    label_ya, label_ax = mesh.labels[f, fy], mesh.labels[f, fx]
+    label_xb, label_by = mesh.labels[g, gx], mesh.labels[g, gy]
+    _write_face(mesh, f, (a, x, b), (across_xb, g, across_ax), (label_xb, 0, label_ax))
+    _write_face(mesh, g, (a, b, y), (across_by, across_ya, f), (label_by, label_ya, 0))
+    _replace_neighbour(mesh, across_xb, g, f)
+    _replace_neighbour(mesh, across_ya, f, g)
+    mesh.deviation[f] = deviation
+    mesh.deviation[g] = deviation
+    return True
+
+
+@kernel
+def flip_to_delaunay(mesh, n_stacked, tolerance):
+    """Flip sides of the first ``n_stacked`` faces on the stack, and of the faces that change, until none is better.
+
+    In a plane that ends, as every flip raises the least angle of the two triangles; elsewhere the deviation grows with
+    every flip, up to the tolerance. If the stack is full, sides may stay that are not Delaunay.
+    """
+    while n_stacked > 0:
+        n_stacked -= 1
+        face = mesh.stack[n_stacked]
+        side = 0
+        while side < 3:
+            other = mesh.neighbours[face, side]
+            if not _flip_if_better(mesh, face, side, tolerance):
+                side += 1
+                continue
+            side = 0
+            if n_stacked < len(mesh.stack):
+                mesh.stack[n_stacked] = other
+                n_stacked += 1
+
+
+@kernel
+def _split_side(mesh, n_points, n_faces, f, i):
+    """Split side i of a face at its middle, which becomes point ``n_points``; return the new number of faces."""
+    g = mesh.neighbours[f, i]
+    fy, fx = (i + 1) % 3, (i + 2) % 3
+    a, x, y, middle = mesh.faces[f, i], mesh.faces[f, fy], mesh.faces[f, fx], n_points
+    for k in range(3):
+        mesh.points[middle, k] = 0.5 * (mesh.points[x, k] + mesh.points[y, k])
+    mesh.parents[middle, 0] = x
+    mesh.parents[middle, 1] = y
+    label = mesh.labels[f, i]
+    new_f = n_faces
+    new_g = n_faces + 1 if g >= 0 else -1
+    across, label_across = mesh.neighbours[f, fy], mesh.labels[f, fy]
+    _write_face(mesh, new_f, (a, middle, y), (new_g, across, f), (label, label_across, 0))
+    _write_face(mesh, f, (a, x, middle), (g, new_f, mesh.neighbours[f, fx]), (label, 0, mesh.labels[f, fx]))
+    _replace_neighbour(mesh, across, f, new_f)
+    mesh.deviation[new_f] = mesh.deviation[f]
+    if g < 0:
+        return n_faces + 1
+    j = _side_towards(mesh, g, f)
+    gx, gy = (j + 1) % 3, (j + 2) % 3
+    b = mesh.faces[g, j]
+    across, label_across = mesh.neighbours[g, gy], mesh.labels[g, gy]
+    _write_face(mesh, new_g, (b, y, middle), (new_f, g, across), (label, 0, label_across))
+    _write_face(mesh, g, (b, middle, x), (f, mesh.neighbours[g, gx], new_g), (label, mesh.labels[g, gx], 0))
+    _replace_neighbour(mesh, across, g, new_g)
+    mesh.deviation[new_g] = mesh.deviation[g]
+    return n_faces + 2
+
+
+@kernel
+def refine(mesh, n_points, n_faces, min_thickness, min_square, tolerance):
+    """Split longest sides until no face thinner than the bound, area over squared side, has one of a higher square.
+
+    From a thin face a path leads across longest sides to a side that is the longest one of both its faces (Rivara);
+    that one is split, and the faces around it are made Delaunay.
+
+    Returns
+    -------
+    tuple
+        Numbers of points and faces; fewer than two free rows of faces or none of points end the refinement early.
+    """
+    face = 0
+    passed = 0  # faces in a row that need no split, up to the present one
+    while passed < n_faces and n_faces + 2 <= len(mesh.faces) and n_points < len(mesh.points):
+        face %= n_faces
+        side, square = _longest_side(mesh, face)
+        if square <= min_square or _area(mesh, face) >= min_thickness * square:
+            face += 1
+            passed += 1
+            continue
+        passed = 0
+        last = face
+        while mesh.neighbours[last, side] >= 0:
+            other_side, other_square = _longest_side(mesh, mesh.neighbours[last, side])
+            if other_square <= _LONGER * square:
+                break
+            last = mesh.neighbours[last, side]
+            side, square = other_side, other_square
+        other = mesh.neighbours[last, side]
+        first = n_faces
+        n_faces = _split_side(mesh, n_points, n_faces, last, side)
+        n_points += 1
+        mesh.stack[0] = last
+        n_stacked = 1
+        for added in range(first, n_faces):
+            mesh.stack[n_stacked] = added
+            n_stacked += 1
+        if other >= 0:
+            mesh.stack[n_stacked] = other
+            n_stacked += 1
+        flip_to_delaunay(mesh, n_stacked, tolerance)
+    return n_points, n_faces
