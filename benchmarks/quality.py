@@ -1,6 +1,7 @@
-"""Quality, distance and validity of remeshes of real closed meshes.
+"""Quality, distance, creases and validity of remeshes of real meshes: smooth ones, CAD parts, badly triangulated ones.
 
-Usage: python benchmarks/quality.py [--ratios 1 0.2 0.1] [--sharpness 7 1] [--only NAME] [--fresh]
+Usage: python benchmarks/quality.py [--folders test] [--ratios 1 0.2 0.1] [--sharpness 7 1] [--only NAME] [--kind KIND]
+       [--fresh]
 """
 
 from __future__ import annotations
@@ -11,41 +12,97 @@ import json
 import os
 import sys
 from collections import defaultdict
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
 import numpy as np
+import numpy.typing as npt
 
 import anisomesh
+from anisomesh import RemeshResult, Surface
 from anisomesh.caveats import COUNT_TOLERANCE
-from anisomesh.mesh.topology import connected_components
+from anisomesh.mesh.closest_points import ClosestPoints
+from anisomesh.metric.quality import anisotropic_quality
+from anisomesh.metric.tensors import metric_root
+from anisomesh.metric.transfer import transfer_metric_roots
 
 OUT = Path(__file__).parent / "out" / "quality.jsonl"
 
 
-def closed_meshes(data: Path) -> list[Path]:
+BAD, CAD, SMOOTH = "bad triangles", "CAD", "smooth"
+MIN_QUALITY = 0.7  # area-weighted mean quality of the triangles, below which a mesh is badly triangulated
+FLAT_HEIGHT = 1e-6  # of the diagonal: corners this near to the plane of the closest input facet lie in it
+
+
+@dataclass(frozen=True)
+class Case:
+    """A mesh file and its kind."""
+
+    path: Path
+    kind: str
+
+    @property
+    def name(self) -> str:
+        return f"{self.path.parent.name}/{self.path.stem}"
+
+
+def cases(data: Path, folders: list[str]) -> list[Case]:
+    """Return the meshes of the folders, except ones that the manifest does not call closed and manifold."""
     with (data / "manifest.csv").open(newline="") as file:
-        rows = list(csv.DictReader(file))
-    return [
-        data / row["file"]
-        for row in rows
-        if row["file"].startswith("test/") and row["closed"] == "1" and row["manifold"] == "1"
-    ]
+        listed = {row["file"]: row for row in csv.DictReader(file)}
+    found = []
+    for path in (path for folder in folders for path in sorted((data / folder).glob("*.ply"))):
+        row = listed.get(f"{path.parent.name}/{path.name}", {"closed": "1", "manifold": "1", "category": "cad"})
+        if row["closed"] == row["manifold"] == "1":
+            found.append(Case(path, kind_of(anisomesh.load(path), is_cad=row["category"] == "cad")))
+    return found
 
 
-def measure(path: Path, ratio: float, sharpness: float) -> dict[str, Any]:
-    result = anisomesh.remesh(anisomesh.load(path), ratio=ratio, sharpness=sharpness, embedding="direct")
+def kind_of(mesh: Surface, *, is_cad: bool) -> str:
+    """Return the kind of a mesh, by the shape of its triangles and the category of the manifest."""
+    mean = np.average(euclidean_quality(mesh), weights=np.maximum(mesh.face_areas, 1e-300))
+    return BAD if mean < MIN_QUALITY else CAD if is_cad else SMOOTH
+
+
+def euclidean_quality(mesh: Surface) -> npt.NDArray[np.float64]:
+    """Return 4 sqrt(3) area over the sum of the squared sides of the triangles (F,)."""
+    return anisotropic_quality(mesh.points, mesh.faces, np.tile(np.eye(3), (mesh.n_points, 1, 1)))
+
+
+def quality_in_own_metric(result: RemeshResult) -> float:
+    """Return the mean quality of the triangles in the metric that was aimed at, at the working surface."""
+    mesh = result.surface.with_points(result.frame.to_unit(result.surface.points))
+    roots = transfer_metric_roots(ClosestPoints(result.working), metric_root(result.tensors), mesh.points)
+    return float(anisotropic_quality(mesh.points, mesh.faces, roots).mean())
+
+
+def flat_quality(result: RemeshResult) -> float | None:
+    """Return the mean Euclidean quality of the triangles in planes of the input, None if there are none."""
+    reference, mesh = result.prepared, result.surface
+    corners = mesh.points[mesh.faces]
+    facet, _ = ClosestPoints(reference).locate(corners.mean(axis=1))
+    offset = corners - reference.points[reference.faces[facet, 0]][:, None]
+    height = np.abs(np.einsum("fcx,fx->fc", offset, reference.face_normals[facet])).max(axis=1)
+    flat = height < FLAT_HEIGHT * reference.diagonal
+    return float(euclidean_quality(mesh)[flat].mean()) if flat.any() else None
+
+
+def measure(case: Case, ratio: float, sharpness: float) -> dict[str, Any]:
+    result = anisomesh.remesh(anisomesh.load(case.path), ratio=ratio, sharpness=sharpness, embedding="direct")
     evaluation = anisomesh.evaluate(result.prepared, result.surface)
     distance = evaluation.distance
     return {
-        "mesh": path.stem,
+        "mesh": case.name,
+        "kind": case.kind,
         "ratio": ratio,
         "sharpness": sharpness,
         "g_mean": evaluation.shape.g_mean,
-        "g_min": evaluation.shape.g_min,
+        "g_working": quality_in_own_metric(result),
+        "flat_quality": flat_quality(result),
         "mean_square": distance.mean_square_ab + distance.mean_square_ba,
         "hausdorff": distance.hausdorff,
-        "components_input": connected_components(result.prepared.faces, result.prepared.n_points)[0],
+        "creases": evaluation.features.crease_covered,
         **result.report(),
     }
 
@@ -53,55 +110,77 @@ def measure(path: Path, ratio: float, sharpness: float) -> dict[str, Any]:
 def faults(row: dict[str, Any]) -> list[str]:
     """Return the faults of a result in words."""
     validity = row["validity"]
-    found = [name for name in ("closed", "oriented") if not validity[name]]
-    found += [name for name in ("nonmanifold_edges", "nonmanifold_vertices", "inverted") if validity[name]]
-    if validity["euler"] != validity["euler_input"]:
-        found.append(f"euler {validity['euler']} for {validity['euler_input']}")
-    if validity["components"] != row["components_input"]:
-        found.append(f"components {validity['components']} for {row['components_input']}")
+    found = [] if validity["oriented"] else ["not oriented"]
+    names = ("nonmanifold_edges", "nonmanifold_vertices", "inverted", "new_intersections")
+    found += [f"{name} {validity[name]}" for name in names if validity[name]]
+    found += [
+        f"{name} {validity[name]} for {validity[f'{name}_input']}"
+        for name in ("euler", "components", "boundary_loops")
+        if validity[name] != validity[f"{name}_input"]
+    ]
     if abs(row["vertices"] - row["vertices_asked"]) > COUNT_TOLERANCE * row["vertices_asked"]:
         found.append(f"{row['vertices']} vertices for {row['vertices_asked']}")
     return found
 
 
 def tables(rows: list[dict[str, Any]]) -> str:
-    groups: dict[tuple[float, float], list[dict[str, Any]]] = defaultdict(list)
+    groups: dict[tuple[float, float, str], list[dict[str, Any]]] = defaultdict(list)
     for row in rows:
-        groups[row["sharpness"], row["ratio"]].append(row)
+        groups[-row["sharpness"], -row["ratio"], row["kind"]].append(row)
     lines = [
-        "| s | ratio | meshes | G mean | G min of means | E2 [1e-7 D²] | HD [1e-3 D] | time [s] | faults |",
-        "|" + "---|" * 9,
+        "| s | ratio | meshes | G | G, working metric | G, least | flat triangles | creases | E2 [1e-7 D²] "
+        "| HD [1e-3 D] | time [s], mean | median | faults |",
+        "|" + "---|" * 13,
     ]
-    for (sharpness, ratio), group in sorted(groups.items(), reverse=True):
-        g = np.array([row["g_mean"] for row in group])
-        e2 = np.exp(np.mean(np.log([row["mean_square"] for row in group]))) * 1e7
-        hd = np.exp(np.mean(np.log([row["hausdorff"] for row in group]))) * 1e3
-        seconds = np.mean([row["seconds"]["total"] for row in group])
-        bad = sum(bool(faults(row)) for row in group)
-        lines.append(
-            f"| {sharpness:g} | {ratio:.0%} | {len(group)} | {g.mean():.3f} | {g.min():.3f} | {e2:.2f} | {hd:.2f} "
-            f"| {seconds:.2f} | {bad} |"
-        )
-    lines.append("")
+    for (_, _, kind), group in sorted(groups.items()):
+        flat = [row["flat_quality"] for row in group if row["flat_quality"] is not None]
+        seconds = [row["seconds"]["total"] for row in group]
+        cells = [
+            f"{group[0]['sharpness']:g}",
+            f"{group[0]['ratio']:.0%}",
+            f"{len(group)} {kind}",
+            f"{mean(group, 'g_mean'):.3f}",
+            f"{mean(group, 'g_working'):.3f}",
+            f"{min(row['g_mean'] for row in group):.3f}",
+            f"{np.mean(flat):.3f}" if flat else "",
+            f"{mean(group, 'creases'):.1%}",
+            f"{geometric_mean(group, 'mean_square') * 1e7:.2f}",
+            f"{geometric_mean(group, 'hausdorff') * 1e3:.2f}",
+            f"{np.mean(seconds):.2f}",
+            f"{np.median(seconds):.2f}",
+            f"{sum(bool(faults(row)) for row in group)}",
+        ]
+        lines.append(f"| {' | '.join(cells)} |")
+    faulty = [row for row in rows if faults(row)]
     lines += [
-        f"{row['mesh']} {row['ratio']:.0%} s={row['sharpness']:g}: {', '.join(faults(row))}"
-        for row in rows
-        if faults(row)
+        "",
+        *(f"{row['mesh']} {row['ratio']:.0%} s={row['sharpness']:g}: {', '.join(faults(row))}" for row in faulty),
     ]
     return "\n".join(lines)
+
+
+def mean(rows: list[dict[str, Any]], name: str) -> float:
+    return float(np.mean([row[name] for row in rows]))
+
+
+def geometric_mean(rows: list[dict[str, Any]], name: str) -> float:
+    """Return the geometric mean of figures, of which exact results (0) count as 1e-16."""
+    return float(np.exp(np.mean(np.log([max(row[name], 1e-16) for row in rows]))))
 
 
 def read_rows() -> list[dict[str, Any]]:
     """Return the rows of earlier calls; rows of versions with other names of the figures are left out."""
     rows = [json.loads(line) for line in OUT.read_text().splitlines()] if OUT.exists() else []
-    return [row for row in rows if "inverted" in row["validity"]]
+    return [row for row in rows if "kind" in row]
 
 
 def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--ratios", type=float, nargs="+", default=[1.0, 0.2, 0.1])
     parser.add_argument("--sharpness", type=float, nargs="+", default=[7.0, 1.0])
+    parser.add_argument("--folders", nargs="+", default=["test"], help="subfolders of ANISOMESH_DATA")
     parser.add_argument("--only", default="", help="run only meshes with this in their names")
+    parser.add_argument("--kind", choices=[BAD, CAD, SMOOTH], help="run only meshes of this kind")
     parser.add_argument("--fresh", action="store_true", help="discard earlier rows")
     options = parser.parse_args()
     if "ANISOMESH_DATA" not in os.environ:
@@ -111,30 +190,35 @@ def main() -> None:
         OUT.unlink(missing_ok=True)
     rows = read_rows()
     done = {(row["mesh"], row["ratio"], row["sharpness"]) for row in rows}
+    chosen = [
+        case
+        for case in cases(Path(os.environ["ANISOMESH_DATA"]), options.folders)
+        if options.only in case.name and options.kind in (None, case.kind)
+    ]
     todo = [
-        (path, ratio, sharpness)
+        (case, ratio, sharpness)
         for ratio in options.ratios
         for sharpness in options.sharpness
-        for path in closed_meshes(Path(os.environ["ANISOMESH_DATA"]))
-        if options.only in path.name and (path.stem, ratio, sharpness) not in done
+        for case in chosen
+        if (case.name, ratio, sharpness) not in done
     ]
-    for number, (path, ratio, sharpness) in enumerate(todo, 1):
+    for number, (case, ratio, sharpness) in enumerate(todo, 1):
         try:
-            row = measure(path, ratio, sharpness)
+            row = measure(case, ratio, sharpness)
         except Exception as error:  # a crash is a result too
-            print(f"[{number}/{len(todo)}] {path.stem} {ratio:.0%} s={sharpness:g}: {error!r}", file=sys.stderr)
+            print(f"[{number}/{len(todo)}] {case.name} {ratio:.0%} s={sharpness:g}: {error!r}", file=sys.stderr)
             continue
         rows.append(row)
         with OUT.open("a") as file:
             file.write(json.dumps(row) + "\n")
         print(
-            f"[{number}/{len(todo)}] {path.stem[:28]:<28} {ratio:.0%} s={sharpness:g} G {row['g_mean']:.3f} "
+            f"[{number}/{len(todo)}] {case.name[:34]:<34} {ratio:.0%} s={sharpness:g} G {row['g_mean']:.3f} "
             f"E2 {row['mean_square'] * 1e7:.2f}e-7 HD {row['hausdorff'] * 1e3:.2f}e-3 {row['seconds']['total']:.2f} s "
             f"{' '.join(faults(row))}",
             file=sys.stderr,
             flush=True,
         )
-    print(tables(rows))
+    print(tables([row for row in rows if row["mesh"] in {case.name for case in chosen}]))
 
 
 if __name__ == "__main__":
