@@ -48,7 +48,7 @@ def main(out: str = "stages.png", n_vertices: int = 600) -> anisomesh.Surface:
 
     # 5. Triangles: the dual of the diagram, made valid
     task = anisomesh.MeshingTask(
-        voronoi=voronoi, features=features, fallback=surface, tensors=field.tensors, n_vertices=n_vertices
+        voronoi=voronoi, features=features, surface=surface, tensors=field.tensors, n_vertices=n_vertices
     )
     mesh = anisomesh.mesh_from_sites(task, optimised.sites)
     validity = check_validity(anisomesh.Surface(mesh.points, mesh.faces), surface)

@@ -188,7 +188,7 @@ def _remesh(source: _Input, n: int, options: RemeshOptions, run: _Run) -> Remesh
         task = MeshingTask(
             voronoi=voronoi,
             features=features,
-            fallback=surface,
+            surface=surface,
             tensors=field.tensors,
             n_vertices=n,
             deadline=run.deadline,

@@ -31,7 +31,7 @@ def mesh_of(voronoi, sites, crease_angle=180.0, required=False):
     task = MeshingTask(
         voronoi=voronoi,
         features=features,
-        fallback=embedded.surface,
+        surface=embedded.surface,
         tensors=uniform_metric(embedded.surface),
         n_vertices=n,
     )

@@ -76,8 +76,9 @@ class MeshingTask:
         The diagram over the embedded surface.
     features
         Boundary and creases of the surface.
-    fallback
-        Another mesh of the same surface, which is coarsened if the sites are too few for its topology.
+    surface
+        The surface to mesh, against which faults are counted; the embedded one may differ by a tolerance. It is
+        coarsened if the sites are too few for its topology.
     tensors
         The metric at the points of the embedded surface (V, 3, 3).
     n_vertices
@@ -88,14 +89,19 @@ class MeshingTask:
 
     voronoi: RestrictedVoronoi
     features: FeatureNetwork
-    fallback: Surface
+    surface: Surface
     tensors: PointTensors
     n_vertices: int
     deadline: Deadline = NO_DEADLINE
 
     @cached_property
     def reference(self) -> ClosestPoints:
-        """Closest points of the surface in space."""
+        """Closest points of the surface to mesh."""
+        return ClosestPoints(self.surface)
+
+    @cached_property
+    def embedded_reference(self) -> ClosestPoints:
+        """Closest points of the embedded surface in space, on which the metric is known."""
         return ClosestPoints(self.voronoi.embedded.surface)
 
     @cached_property
@@ -119,7 +125,7 @@ class ValidMesh:
     removed
         Points removed again by edge collapses.
     from_input
-        Whether the fallback was coarsened, because its topology needs many more sites.
+        Whether the surface was coarsened, because its topology needs many more sites.
     """
 
     points: Points
@@ -156,7 +162,7 @@ def mesh_from_sites(task: MeshingTask, sites: Sites) -> ValidMesh:
     8. Where triangles are still inverted, flat or intersecting, sites are added and all is repeated, at most four
        times. The result has more vertices in all only if that makes it valid.
 
-    If step 1 or 2 fails (a tube thinner than the distance between sites), the fallback, which is valid, is coarsened by
+    If step 1 or 2 fails (a tube thinner than the distance between sites), the surface, which is valid, is coarsened by
     the same collapses. The paper inserts sites for every defect and optimises again, which makes new defects.
 
     Every step is bounded, and steps 4 to 7 keep the topology change by change, so the result is always a manifold with
@@ -173,7 +179,7 @@ def mesh_from_sites(task: MeshingTask, sites: Sites) -> ValidMesh:
         if len(bad) == 0 or trial.from_input or task.deadline.passed():
             break
         corners = trial.points[trial.faces[bad]]
-        more = points_at_faults(corners, reference, task.voronoi.embedded, sites, task.features.spacing)
+        more = points_at_faults(corners, task.embedded_reference, task.voronoi.embedded, sites, task.features.spacing)
         if len(more) == 0:
             break
         sites = np.concatenate([sites, more])
@@ -189,10 +195,10 @@ def _attempt(task: MeshingTask, sites: Sites, n_start: int) -> ValidMesh:
     """Return the mesh of these sites, of which the first were optimised: steps 1 to 7 of :func:`mesh_from_sites`."""
     controlled = control_topology(task.voronoi, sites, task.features, task.n_vertices)
     dual = _dual_in_space(task, controlled)
-    mesh = dual if dual is not None else FeatureMesh.of(task.fallback)
+    mesh = dual if dual is not None else FeatureMesh.of(task.surface)
     n_first = len(mesh.points)
     mesh = _coarsened(task, _without_inverted(task, mesh))
-    roots = transfer_metric_roots(task.reference, task.roots, mesh.points)
+    roots = transfer_metric_roots(task.embedded_reference, task.roots, mesh.points)
     points = mesh.points
     faces = flip_for_shape(points, mesh.faces, roots, task.reference, kept=mesh.crease_edges)
     if len(points) < task.n_vertices:
