@@ -26,8 +26,8 @@ hypothesis.settings.load_profile(os.environ.get("HYPOTHESIS_PROFILE") or ("ci" i
 CLI = [sys.executable, "-m", "anisomesh"]
 
 _COMPILE = (
-    "import anisomesh; from anisomesh.shapes.analytic import sphere\n"
-    "anisomesh.remesh(sphere(3), n_vertices=300, embedding='direct')",
+    "import anisomesh; from anisomesh.shapes.analytic import box, sphere\n"
+    "for shape in (sphere(3), box((9.0, 1.0, 1.0), n=1)): anisomesh.remesh(shape, n_vertices=300, embedding='direct')",
     "import anisomesh; from anisomesh.shapes.analytic import sphere; ball = sphere(3)\n"
     "anisomesh.evaluate(ball, ball, samples=100)\n"
     "from anisomesh.learn.inference.predict import predict\n"

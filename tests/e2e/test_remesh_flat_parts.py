@@ -3,10 +3,12 @@
 import igl
 import numpy as np
 import pytest
+from sliver_shapes import thick_comb
 
 import anisomesh
 from anisomesh.evaluation.preservation import feature_preservation
 from anisomesh.features.detect import corners, points_along, sharp_edges
+from anisomesh.metric.quality import anisotropic_quality
 from anisomesh.shapes.analytic import box
 from anisomesh.shapes.parts import sparse_parts
 
@@ -54,3 +56,13 @@ def test_round_creases_of_sparse_parts_are_covered_by_chords(name):
     assert kept.crease_covered > 0.99
     assert result.validity.new_intersections == result.validity.inverted == 0
     assert result.surface.n_points == 300
+
+
+def test_triangles_on_flat_faces_do_not_take_after_the_slivers_of_the_input():
+    part = thick_comb(300, bulge=0.2)
+    result = anisomesh.remesh(part, n_vertices=300, embedding="direct", max_iterations=50)
+    new = result.surface
+    quality = anisotropic_quality(new.points, new.faces, np.tile(np.eye(3), (new.n_points, 1, 1)))
+    on_top = (np.abs(new.points[new.faces][:, :, 2] - 0.1) < 1e-9).all(axis=1)
+    assert quality[on_top].mean() > 0.85
+    assert result.validity.inverted == result.validity.new_intersections == 0

@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
+from sliver_shapes import comb, needle_tube
 
 from anisomesh.errors import OptionError
 from anisomesh.mesh import topology
@@ -29,28 +30,6 @@ def slivers(surface, min_length):
     """Return which faces are slivers longer than a length."""
     longest = surface.edge_lengths[surface.face_edges].max(axis=1)
     return (thickness(surface.points[surface.faces]) < 0.5 / ASPECT) & (longest > min_length)
-
-
-def comb(teeth, seed=0):
-    """Return a flat plate triangulated as CAD programs do, all triangles from rim to rim."""
-    rng = np.random.default_rng(seed)
-    x = np.sort(np.concatenate([[0.0, 1.0], rng.random(teeth)]))
-    lower, upper = (np.stack([x, np.full_like(x, y), np.zeros_like(x)], axis=1) for y in (0.0, 0.6))
-    k, n = np.arange(teeth + 1), teeth + 2
-    faces = np.concatenate([np.stack([k, k + 1, n + k], axis=1), np.stack([k + 1, n + k + 1, n + k], axis=1)])
-    return Surface(np.concatenate([lower, upper]), faces.astype(np.int32))
-
-
-def needle_tube(sections, height=3.0):
-    """Return the side of a cylinder of radius 1 made of one long quadrilateral per section."""
-    angle = 2.0 * np.pi * np.arange(sections) / sections
-    circle = np.stack([np.cos(angle), np.sin(angle)], axis=1)
-    points = np.concatenate([np.insert(circle, 2, z, axis=1) for z in (0.0, height)])
-    k = np.arange(sections)
-    after = (k + 1) % sections
-    lower = np.stack([k, after, sections + k], axis=1)
-    faces = np.concatenate([lower, np.stack([after, sections + after, sections + k], axis=1)])
-    return Surface(points, faces.astype(np.int32))
 
 
 def opposite_angles(surface):
