@@ -16,7 +16,7 @@ import anisomesh
 from anisomesh.viz import Panel, PictureOptions, gallery, stretch_colouring
 
 
-@numba.njit(cache=True)
+@numba.njit
 def height_spread(vertices: Any, site: Any, normal: Any, vertex_gradient: Any, site_gradient: Any) -> float:
     """Return the integral of (z - z of the site)^2 over a polygon, and add its derivatives to the gradients.
 

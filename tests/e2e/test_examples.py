@@ -30,6 +30,11 @@ def test_every_example_is_tested():
     assert {path.stem for path in FOLDER.glob("*.py")} == tested | tutorials
 
 
+def test_compiled_functions_of_examples_are_not_cached():
+    """Machine code cached under one module name cannot be loaded under another, as a script or in the documentation."""
+    assert example("own_energy").height_spread.stats.cache_path is None
+
+
 @pytest.mark.slow
 def test_remesh_a_surface(tmp_path, capsys, torus_obj):
     result = example("remesh_a_surface").main(torus_obj, tmp_path, n_vertices=200)
