@@ -86,3 +86,9 @@ def test_the_readme_works_on_the_package_index():
     images = re.findall(r"main/(docs/images/[\w.]+)", text)
     assert images
     assert all((ROOT / image).is_file() for image in images)
+
+
+def test_the_api_page_lists_every_public_name():
+    page = (ROOT / "docs/reference/api/index.md").read_text(encoding="utf-8")
+    listed = " ".join(fences(page, "names")).split()
+    assert sorted(listed) == sorted(name for name in anisomesh.__all__ if not name.startswith("_"))
