@@ -93,8 +93,8 @@ def check_energy_gradient(
     Raises
     ------
     ConformanceError
-        If a shape is wrong, a mass is negative, the energies of the cells do not add up, or a derivative is off by more
-        than 1e-4 of the size of the gradient.
+        If a shape is wrong, a value is not finite, a mass is negative, the energies of the cells do not add up, or a
+        derivative is off by more than 1e-4 of the size of the gradient.
     """
     rng = np.random.default_rng(seed)
     voronoi = voronoi or RestrictedVoronoi(_with_normals(torus(n_major=24, n_minor=12)))
@@ -104,12 +104,15 @@ def check_energy_gradient(
     sites = sites + 0.1 * spacing * rng.normal(size=sites.shape)
     here = energy.evaluate(voronoi, sites)
     for name, array, shape in (
+        ("value", here.value, ()),
         ("gradient", here.gradient, sites.shape),
         ("mass", here.mass, (n_sites,)),
         ("per_cell", here.per_cell, (n_sites,)),
     ):
-        if np.shape(array) != shape or not np.isfinite(array).all():
-            raise ConformanceError(f"{name} has shape {np.shape(array)}; expected finite {shape}")
+        if np.shape(array) != shape:
+            raise ConformanceError(f"{name} has shape {np.shape(array)}; expected {shape}")
+        if not np.isfinite(array).all():
+            raise ConformanceError(f"{name} has a value that is not finite")
     if (here.mass < 0.0).any():
         raise ConformanceError(f"mass[{np.argmin(here.mass)}] = {here.mass.min()}; expected no negative mass")
     if abs(here.per_cell.sum() - here.value) > _SUM_TOLERANCE * np.abs(here.per_cell).sum():
@@ -121,8 +124,8 @@ def check_energy_gradient(
         up, down = (energy.evaluate(voronoi, sites + sign * step * direction).value for sign in (1.0, -1.0))
         expected, found = (up - down) / (2.0 * step), float((here.gradient * direction).sum())
         size = max(float(np.linalg.norm(here.gradient)), np.finfo(np.float64).tiny)
-        worst = max(worst, abs(found - expected) / size)
-    if worst > _GRADIENT_TOLERANCE:
+        worst = float(np.maximum(worst, abs(found - expected) / size))  # NaN if any is
+    if not worst <= _GRADIENT_TOLERANCE:
         raise ConformanceError(f"the gradient is off central differences by {worst:.2g} of its size")
     return worst
 

@@ -74,6 +74,9 @@ def test_faults_of_energies_are_found():
         ("mass", lambda mass: -mass, "no negative mass"),
         ("per_cell", lambda energy: 2.0 * energy, "adds up to"),
         ("gradient", lambda gradient: gradient[:, :3], "gradient has shape"),
+        ("gradient", lambda gradient: np.full_like(gradient, np.nan), "gradient has a value that is not finite"),
+        ("value", lambda value: np.nan, "value has a value that is not finite"),
+        ("value", lambda value: np.array([value]), "value has shape"),
     ):
         with pytest.raises(ConformanceError, match=message):
             anisomesh.check_energy_gradient(Wrong(**{name: change}))
