@@ -24,10 +24,10 @@ from anisomesh.cvt.lbfgs import DescentOptions, minimise
 from anisomesh.cvt.lloyd import lloyd
 from anisomesh.cvt.sampling import resample_by_energy, sample_surface
 from anisomesh.embedding.direct import embed
+from anisomesh.mesh.embedded_surface import EmbeddedSurface
 from anisomesh.mesh.geometry import unit_frame
 from anisomesh.mesh.surface import Surface
 from anisomesh.metric.tensors import compute_metric
-from anisomesh.voronoi.embedded_surface import EmbeddedSurface
 from anisomesh.voronoi.restricted import EnergyValue, RestrictedVoronoi
 
 RESAMPLING = NormalMetric(10.5)  # 1.5 times the default sharpness, as in a remesh

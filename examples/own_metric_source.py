@@ -41,7 +41,7 @@ def main(out: str = "own_metric_source.png", n_vertices: int = 600) -> list[anis
     for source in (AroundAxis(1.0), AroundAxis(4.0), anisomesh.Curvature()):
         anisomesh.check_metric_source(source)
         result = anisomesh.remesh(surface, n_vertices=n_vertices, metric=source)
-        note = f"mean stretch {result.stretch.achieved_mean:.1f}"
+        note = f"mean stretch {result.embedding.stretch.achieved_mean:.1f}"
         print(f"{source}: {note}")
         colouring = stretch_colouring(result.surface)
         panels.append(

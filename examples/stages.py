@@ -36,8 +36,7 @@ def main(out: str = "stages.png", n_vertices: int = 600) -> anisomesh.Surface:
     embedded = anisomesh.EmbeddedSurface(surface, embedding.points, embedding.scale)
     voronoi = anisomesh.RestrictedVoronoi(embedded)
     sharp = sharp_edges(embedded.surface, 40.0)
-    spacing = embedded.site_spacing(n_vertices)
-    features = anisomesh.trace_features(embedded.points, embedded.surface, n_vertices, spacing, sharp=sharp)
+    features = anisomesh.trace_features(embedded, n_vertices, sharp=sharp)
     print(f"features: {features.creases.n_polylines} creases of {sharp.sum()} edges")
 
     # 4. Sites: minimise the energy of the normal metric

@@ -26,6 +26,7 @@ if TYPE_CHECKING:
     from anisomesh.features.network import trace_features
     from anisomesh.io.meshes import load, save
     from anisomesh.learn.inference.source import Hybrid, Neural
+    from anisomesh.mesh.embedded_surface import EmbeddedSurface
     from anisomesh.mesh.surface import Surface
     from anisomesh.metric.field import MetricField
     from anisomesh.metric.sources import Approximation, Curvature, Uniform
@@ -36,7 +37,6 @@ if TYPE_CHECKING:
     from anisomesh.result import RemeshResult, save_rvd
     from anisomesh.shapes.analytic import sample
     from anisomesh.viz import side_by_side
-    from anisomesh.voronoi.embedded_surface import EmbeddedSurface
     from anisomesh.voronoi.restricted import EnergyValue, RestrictedVoronoi
 
     __version__: str
@@ -67,7 +67,7 @@ _MODULE_OF = {
     "Embedding": "embedding.base",
     "Direct": "embedding.embedder",
     "precomputed_embedding": "embedding.precomputed",
-    "EmbeddedSurface": "voronoi.embedded_surface",
+    "EmbeddedSurface": "mesh.embedded_surface",
     "RestrictedVoronoi": "voronoi.restricted",
     "trace_features": "features.network",
     "EnergyValue": "voronoi.restricted",

@@ -1,11 +1,14 @@
-"""Array types with their shapes.
+"""Array types with their shapes, and the reading of a user's values as an array.
 
 ``V`` is the number of points, ``F`` of faces, ``E`` of edges, ``S`` of sites; ``d`` is the dimension of the embedding.
 Geometry is float64; indices are int32, and -1 means "none". The shapes are documentation: type checkers see plain
 NumPy arrays.
 """
 
+from typing import Any
+
 import numpy as np
+import numpy.typing as npt
 from jaxtyping import Bool, Float64, Int32
 
 Points = Float64[np.ndarray, "V 3"]
@@ -33,3 +36,17 @@ SiteScalars = Float64[np.ndarray, "S"]
 Vector3 = Float64[np.ndarray, "3"]
 Floats = Float64[np.ndarray, "n"]
 Indices = Int32[np.ndarray, "n"]
+
+
+def real_array(name: str, values: Any, shape: tuple[int, ...], error: type[Exception]) -> npt.NDArray[np.float64]:
+    """Return values as a new float64 array; raise an error of the given type unless they are real and fit the shape."""
+    try:
+        array = np.asarray(values)
+        if array.dtype.kind not in "biufO":
+            raise TypeError(f"type {array.dtype}")
+        array = array.astype(np.float64, order="C")
+    except (TypeError, ValueError) as reason:
+        raise error(f"{name} cannot be read as real numbers: {reason}") from reason
+    if array.shape != shape:
+        raise error(f"{name} has shape {array.shape}; expected {shape}")
+    return array

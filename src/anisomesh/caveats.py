@@ -8,6 +8,7 @@ from anisomesh.cvt.lbfgs import Optimised, Status
 from anisomesh.delaunay.meshing import ValidMesh
 from anisomesh.mesh.validity import Validity
 from anisomesh.options import RemeshOptions
+from anisomesh.resolve import embedding_name
 
 COUNT_TOLERANCE = 0.02  # share of the vertices asked for by which a result may differ without a remark
 
@@ -17,6 +18,8 @@ def caveats(
 ) -> Iterator[str]:
     """Yield one sentence for everything that a user should know about a result of n vertices asked for."""
     n_points = len(mesh.points)
+    if options.device != "cpu" and embedding_name(options) == "direct":
+        yield f"the device {options.device!r} was not used, since there is no network in the direct embedding"
     if noise > 0.0:
         yield f"noise of {noise:.2f} mean edge lengths was removed first; the result follows the denoised surface"
     if optimised.status is Status.TIME_LIMIT:

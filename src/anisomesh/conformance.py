@@ -4,15 +4,16 @@ from __future__ import annotations
 
 import numpy as np
 
-from anisomesh.cvt.energy import Energy
+from anisomesh.cvt.energy import Energy, evaluate_energy
 from anisomesh.embedding.embedder import Embedder, checked_embedding
 from anisomesh.errors import AnisomeshError
+from anisomesh.mesh.embedded_surface import EmbeddedSurface
 from anisomesh.mesh.geometry import unit_frame
 from anisomesh.mesh.surface import Surface
 from anisomesh.metric.field import MetricField, MetricSource, checked_field
 from anisomesh.metric.sources import Curvature
+from anisomesh.options import RemeshOptions
 from anisomesh.shapes.analytic import ellipsoid, open_patch, torus
-from anisomesh.voronoi.embedded_surface import EmbeddedSurface
 from anisomesh.voronoi.restricted import RestrictedVoronoi
 
 _STEP = 1e-6  # of the site spacing, for central differences: error about its square, plus rounding over it
@@ -38,9 +39,14 @@ def check_metric_source(source: MetricSource, surface: Surface | None = None) ->
     ------
     MetricError
         If the result is not a valid :class:`~anisomesh.metric.field.MetricField`.
+    OptionError
+        If a class is given in place of an object.
     ConformanceError
-        If two calls give different results.
+        If the source is not callable, or two calls give different results.
     """
+    if not callable(source):
+        raise ConformanceError(f"a metric source is callable with a surface, and {source!r} is not")
+    RemeshOptions(metric=source)
     for sample in [surface] if surface is not None else _samples():
         field = checked_field(source(sample), sample)
         _expect_equal("tensors", field.tensors, checked_field(source(sample), sample).tensors)
@@ -62,10 +68,12 @@ def check_embedder(embedder: Embedder, surface: Surface | None = None, source: M
     Raises
     ------
     OptionError
-        If the result is not a valid :class:`~anisomesh.embedding.base.Embedding` of the surface.
+        If the embedder is not callable, or its result is not a valid :class:`~anisomesh.embedding.base.Embedding` of
+        the surface.
     ConformanceError
         If two calls give different results.
     """
+    RemeshOptions(embedding=embedder)
     for sample in [surface] if surface is not None else _samples():
         field = checked_field((source or Curvature())(sample), sample)
         embedding = checked_embedding(embedder(sample, field), sample)
@@ -92,40 +100,38 @@ def check_energy_gradient(
 
     Raises
     ------
+    OptionError
+        If the result is not an :class:`~anisomesh.voronoi.restricted.EnergyValue`, a shape is wrong, a number is not
+        finite, or a mass is negative.
     ConformanceError
-        If a shape is wrong, a value is not finite, a mass is negative, the energies of the cells do not add up, or a
-        derivative is off by more than 1e-4 of the size of the gradient.
+        If every mass is 0, the energies of the cells do not add up, or a derivative is off by more than 1e-4 of the
+        size of the gradient.
+
+    Notes
+    -----
+    Masses only scale the steps of the optimisation: wrong ones make it slow, not wrong, and are not found here.
     """
+    RemeshOptions(energy=energy)
     rng = np.random.default_rng(seed)
     voronoi = voronoi or RestrictedVoronoi(_with_normals(torus(n_major=24, n_minor=12)))
     embedded = voronoi.embedded
     spacing = embedded.site_spacing(n_sites)
     sites = embedded.points[rng.choice(len(embedded.points), n_sites, replace=n_sites > len(embedded.points))]
     sites = sites + 0.1 * spacing * rng.normal(size=sites.shape)
-    here = energy.evaluate(voronoi, sites)
-    for name, array, shape in (
-        ("value", here.value, ()),
-        ("gradient", here.gradient, sites.shape),
-        ("mass", here.mass, (n_sites,)),
-        ("per_cell", here.per_cell, (n_sites,)),
-    ):
-        if np.shape(array) != shape:
-            raise ConformanceError(f"{name} has shape {np.shape(array)}; expected {shape}")
-        if not np.isfinite(array).all():
-            raise ConformanceError(f"{name} has a value that is not finite")
-    if (here.mass < 0.0).any():
-        raise ConformanceError(f"mass[{np.argmin(here.mass)}] = {here.mass.min()}; expected no negative mass")
+    here = evaluate_energy(energy, voronoi, sites)
+    if not (here.mass > 0.0).any():
+        raise ConformanceError("every mass is 0; expected the weight of each cell, such as its area")
     if abs(here.per_cell.sum() - here.value) > _SUM_TOLERANCE * np.abs(here.per_cell).sum():
         raise ConformanceError(f"per_cell adds up to {here.per_cell.sum()}, and value is {here.value}")
     worst = 0.0
     for _ in range(directions):
         direction = rng.normal(size=sites.shape)
         step = _STEP * spacing
-        up, down = (energy.evaluate(voronoi, sites + sign * step * direction).value for sign in (1.0, -1.0))
+        up, down = (evaluate_energy(energy, voronoi, sites + sign * step * direction).value for sign in (1.0, -1.0))
         expected, found = (up - down) / (2.0 * step), float((here.gradient * direction).sum())
         size = max(float(np.linalg.norm(here.gradient)), np.finfo(np.float64).tiny)
-        worst = float(np.maximum(worst, abs(found - expected) / size))  # NaN if any is
-    if not worst <= _GRADIENT_TOLERANCE:
+        worst = max(worst, abs(found - expected) / size)
+    if worst > _GRADIENT_TOLERANCE:
         raise ConformanceError(f"the gradient is off central differences by {worst:.2g} of its size")
     return worst
 

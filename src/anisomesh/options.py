@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 import os
 from dataclasses import dataclass
+from numbers import Integral, Real
 from typing import TYPE_CHECKING, Any, Literal, get_args
 
 from anisomesh.errors import OptionError
@@ -19,6 +20,8 @@ if TYPE_CHECKING:  # the command line imports this module, and has to start at o
 
 EmbeddingName = Literal["auto", "direct", "neural", "hybrid"]
 DeviceName = Literal["cpu", "cuda"]
+_NUMBERS = ("sharpness", "feature_angle", "weld_tolerance")
+_OPTIONAL_NUMBERS = ("final_sharpness", "time_limit")
 _LEAST = {"seed": 0, "threads": 1, "lloyd_iterations": 0, "max_iterations": 0, "embedding_iterations": 1}
 
 EMBEDDINGS: tuple[EmbeddingName, ...] = get_args(EmbeddingName)
@@ -98,6 +101,7 @@ class RemeshOptions:
     time_limit: float | None = None
 
     def __post_init__(self) -> None:
+        self._check_types()
         for name in ("sharpness", "final_sharpness"):
             value = getattr(self, name)
             if value is not None and not (math.isfinite(value) and value >= 1.0):
@@ -105,11 +109,26 @@ class RemeshOptions:
         self._check_stages()
         if not 0.0 <= self.feature_angle <= 180.0:
             raise OptionError(f"feature_angle = {self.feature_angle}; expected 0 to 180 degrees")
+        if not (self.weld_tolerance >= 0.0 and math.isfinite(self.weld_tolerance)):
+            raise OptionError(f"weld_tolerance = {self.weld_tolerance}; expected a length of at least 0")
         if self.time_limit is not None and not self.time_limit > 0.0:
             raise OptionError(f"time_limit = {self.time_limit}; expected a positive number of seconds")
         for name, low in _LEAST.items():
             if getattr(self, name) < low:
                 raise OptionError(f"{name} = {getattr(self, name)}; expected at least {low}")
+
+    def _check_types(self) -> None:
+        """Check the types of numbers, switches and names."""
+        for name in (*_NUMBERS, *_OPTIONAL_NUMBERS):
+            value = getattr(self, name)
+            if not (value is None and name in _OPTIONAL_NUMBERS):
+                check_number(name, value)
+        for name in _LEAST:
+            check_whole_number(name, getattr(self, name))
+        if not isinstance(self.denoise, bool):
+            raise OptionError(f"denoise = {self.denoise!r}; expected True or False")
+        if not isinstance(self.weights, str | os.PathLike | None):
+            raise OptionError(f"weights = {self.weights!r}; expected the name of a network or of a file")
 
     def _check_stages(self) -> None:
         """Check metric, embedding and energy, and that they fit each other."""
@@ -122,6 +141,9 @@ class RemeshOptions:
                 raise OptionError(f"embedding = {self.embedding!r}; expected one of {', '.join(EMBEDDINGS)}")
         elif not callable(self.embedding):
             raise OptionError(f"embedding = {self.embedding!r}; expected a name or an embedder")
+        for name in ("metric", "embedding", "energy"):
+            if isinstance(given := getattr(self, name), type):
+                raise OptionError(f"{name} = {given.__name__} is a class; expected an object, {given.__name__}(...)")
         if self.device not in DEVICES:
             raise OptionError(f"device = {self.device!r}; expected one of {', '.join(DEVICES)}")
         if self.energy is not None:
@@ -129,8 +151,22 @@ class RemeshOptions:
                 raise OptionError(f"energy = {self.energy!r}; expected an object with evaluate(voronoi, sites)")
             if self.sharpness != type(self).sharpness:
                 raise OptionError("sharpness belongs to the built-in energy; give it to NormalMetric or leave it out")
+            if self.final_sharpness is not None:
+                raise OptionError("final_sharpness ends with the built-in energy in place of yours; leave one out")
         if self.embedding == "direct" and self.weights is not None:
             raise OptionError("weights belong to a network, and embedding 'direct' has none; use 'neural' or 'hybrid'")
         network = self.embedding in ("neural", "hybrid") or self.weights is not None
         if network and not (isinstance(self.metric, str) and self.metric == "curvature"):
             raise OptionError("a network (embedding, weights) predicts the curvature metric and no other")
+
+
+def check_number(name: str, value: object) -> None:
+    """Raise OptionError unless the value of an option is a real number."""
+    if isinstance(value, bool) or not isinstance(value, Real):
+        raise OptionError(f"{name} = {value!r}; expected a number")
+
+
+def check_whole_number(name: str, value: object) -> None:
+    """Raise OptionError unless the value of an option is an integer."""
+    if isinstance(value, bool) or not isinstance(value, Integral):
+        raise OptionError(f"{name} = {value!r}; expected a whole number")

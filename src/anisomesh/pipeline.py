@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from anisomesh._arrays import EdgeMask, PointScalars, PointTensors
+from anisomesh._arrays import EdgeMask, PointScalars, PointTensors, real_array
 from anisomesh.caveats import caveats
 from anisomesh.cvt.schedule import DualFeedback, optimise_sites
 from anisomesh.deadline import Deadline
@@ -25,18 +25,19 @@ from anisomesh.features.network import FeatureNetwork, trace_features
 from anisomesh.features.tagged import tagged_edges
 from anisomesh.io.convert import as_surface
 from anisomesh.memory import check_memory
+from anisomesh.mesh.embedded_surface import EmbeddedSurface
 from anisomesh.mesh.geometry import unit_frame
 from anisomesh.mesh.surface import Surface
 from anisomesh.mesh.validity import check_validity
 from anisomesh.mesh.working_surface import working_surface
 from anisomesh.metric.field import checked_field
-from anisomesh.options import RemeshOptions
+from anisomesh.metric.tensors import validate_metric
+from anisomesh.options import RemeshOptions, check_number, check_whole_number
 from anisomesh.progress import OnStep, StepInfo, ignore_steps
 from anisomesh.repair.prepare import Prepared, prepare
 from anisomesh.resolve import cvt_options, embedder, embedding_name, follows_creases, metric_source
 from anisomesh.result import RemeshResult
 from anisomesh.search import MIN_VERTICES, smallest_within
-from anisomesh.voronoi.embedded_surface import EmbeddedSurface
 from anisomesh.voronoi.restricted import RestrictedVoronoi
 
 WEAK_ANGLE = 20.0  # degrees; edges this sharp stay in the working surface, weak features among them; heuristic
@@ -95,7 +96,7 @@ def remesh(
     ----------
     "NASM: Neural Anisotropic Surface Meshing", SIGGRAPH Asia 2024.
     """
-    options = _with_overrides(options or RemeshOptions(), overrides)
+    options = _with_overrides(RemeshOptions() if options is None else options, overrides)
     deadline = Deadline(options.time_limit)
     run = _Run(on_step or ignore_steps, deadline)
     surface = as_surface(mesh, faces)
@@ -140,11 +141,14 @@ def _prepared_input(surface: Surface, options: RemeshOptions) -> _Input:
     prepared = prepare(surface, weld_tolerance=options.weld_tolerance)
     tensors = density = None
     if not isinstance(options.metric, str) and not callable(options.metric):
-        tensors = _at_prepared("metric", options.metric, (surface.n_points, 3, 3), prepared)
+        given = _at_prepared("metric", options.metric, (surface.n_points, 3, 3), prepared, MetricError)
+        tensors = validate_metric(given, prepared.surface, numbers=prepared.point_source)
     if options.density is not None:
-        density = _at_prepared("density", options.density, (surface.n_points,), prepared)
-        if not (np.isfinite(density) & (density > 0.0)).all():
-            raise OptionError("density has a value that is not a positive number; expected a positive weight per point")
+        density = _at_prepared("density", options.density, (surface.n_points,), prepared, OptionError)
+        invalid = np.flatnonzero(~(np.isfinite(density) & (density > 0.0)))
+        if len(invalid):
+            value, where = density[invalid[0]], prepared.point_source[invalid[0]]
+            raise OptionError(f"density[{where}] = {value:g}; expected a positive weight for each point of the input")
     tagged = np.zeros(len(prepared.surface.edges), dtype=bool)
     if options.features is not None:
         tagged = tagged_edges(surface, options.features, prepared.surface, options.weld_tolerance)
@@ -225,7 +229,7 @@ def _features(embedded: EmbeddedSurface, n: int, tagged: EdgeMask, options: Reme
     """
     angle = options.feature_angle if follows_creases(options) else 180.0
     sharp = sharp_edges(embedded.surface, angle) | tagged
-    return trace_features(embedded.points, embedded.surface, n, embedded.site_spacing(n), sharp=sharp, required=tagged)
+    return trace_features(embedded, n, sharp=sharp, required=tagged)
 
 
 class _Run:
@@ -255,6 +259,8 @@ class _Run:
 
 
 def _with_overrides(options: RemeshOptions, overrides: dict[str, Any]) -> RemeshOptions:
+    if not isinstance(options, RemeshOptions):
+        raise OptionError(f"options is of type {type(options).__name__}; expected RemeshOptions")
     known = [field.name for field in fields(RemeshOptions)]
     for name in overrides:
         if name not in known:
@@ -265,20 +271,21 @@ def _with_overrides(options: RemeshOptions, overrides: dict[str, Any]) -> Remesh
 def _check_count(n_vertices: int | None, ratio: float | None, max_error: float | None) -> None:
     if (n_vertices, ratio, max_error).count(None) != 2:
         raise OptionError("give one of n_vertices, ratio and max_error")
+    if n_vertices is not None:
+        check_whole_number("n_vertices", n_vertices)
+    for name, value in (("ratio", ratio), ("max_error", max_error)):
+        if value is not None:
+            check_number(name, value)
     if max_error is not None and not (np.isfinite(max_error) and max_error > 0.0):
         raise OptionError(f"max_error = {max_error}; expected a positive length in model units")
-    if n_vertices is not None and (n_vertices != int(n_vertices) or n_vertices < MIN_VERTICES):
+    if n_vertices is not None and n_vertices < MIN_VERTICES:
         raise OptionError(f"n_vertices = {n_vertices}; expected a whole number of at least {MIN_VERTICES}")
     if ratio is not None and not (np.isfinite(ratio) and ratio > 0.0):
         raise OptionError(f"ratio = {ratio}; expected a positive number, such as 0.2 for a fifth of the vertices")
 
 
-def _at_prepared(name: str, values: Any, shape: tuple[int, ...], prepared: Prepared) -> npt.NDArray[np.float64]:
+def _at_prepared(
+    name: str, values: Any, shape: tuple[int, ...], prepared: Prepared, error: type[Exception]
+) -> npt.NDArray[np.float64]:
     """Return values at the points of the input as values at the prepared points."""
-    if np.shape(values) != shape:
-        wanted = MetricError if name == "metric" else OptionError
-        raise wanted(f"{name} has shape {np.shape(values)}; expected {shape}: one value for each point of the input")
-    try:
-        return np.asarray(np.asarray(values, dtype=np.float64)[prepared.point_source])
-    except (TypeError, ValueError) as error:
-        raise MetricError(f"{name} cannot be read as numbers: {error}") from error
+    return np.asarray(real_array(name, values, shape, error)[prepared.point_source])

@@ -41,7 +41,7 @@ def refuse(run_cli, tmp_path):
         (["-n", "100", "--final-sharpness", "inf"], "--final-sharpness"),
         (["-n", "100", "--threads", "0"], "--threads"),
         (["-n", "100", "--seed", "-1"], "--seed"),
-        (["-n", "100", "--metric", "euclidean"], "--metric"),
+        (["-n", "100", "--metric", "euclidean"], "'--metric': 'euclidean' is not one of"),
         (["-n", "100", "--embedding", "magic"], "--embedding"),
         (["-n", "100", "--rvd", "cells.png"], ".vtu or .obj"),
         (["-n", "100", "--picture", "both.jpg"], ".png"),
@@ -64,6 +64,37 @@ def test_an_output_that_cannot_be_written_is_refused_before_any_work(run_cli, to
     assert process.stderr.startswith("anisomesh: error: ")
     assert len(process.stderr.splitlines()) == 1
     assert list(tmp_path.iterdir()) == []
+
+
+@pytest.mark.parametrize("option", ["--report", "--picture", "--rvd", "--out"])
+def test_no_output_overwrites_an_input(run_cli, torus_obj, tmp_path, option):
+    """Only the mesh may replace its own input; no file of features or network is replaced either."""
+    suffix = {"--report": ".obj", "--picture": ".png", "--rvd": ".obj", "--out": ".obj"}[option]
+    mesh, pairs = tmp_path / f"mesh{suffix}", tmp_path / "pairs.obj"
+    mesh.write_bytes(torus_obj.read_bytes())
+    pairs.write_text("0 1\n")
+    (tmp_path / "link").symlink_to(tmp_path)
+    out = pairs if option == "--out" else tmp_path / "link" / mesh.name
+    words = [option, out] if option == "--out" else ["-o", "out.ply", option, out]
+    done = run_cli("remesh", mesh, "-n", 100, *words, "--features", pairs, cwd=tmp_path)
+    assert done.returncode == 2
+    assert "is an input and would be overwritten" in done.stderr
+    assert mesh.read_bytes() == torus_obj.read_bytes()
+    assert pairs.read_text() == "0 1\n"
+    assert not (tmp_path / "out.ply").exists()
+
+
+@pytest.mark.skipif(not Path("/proc/self").exists(), reason="there is no folder in which nobody can write")
+def test_a_folder_that_cannot_be_written_is_found_out_before_the_work(refuse, torus_obj):
+    assert "cannot be written" in refuse(2, "remesh", torus_obj, "-o", "/proc/out.ply", "-n", 100)
+
+
+def test_a_file_of_features_that_is_missing_or_binary_is_named(refuse, torus_obj, tmp_path):
+    words = ["remesh", torus_obj, "-o", "out.ply", "-n", 100, "--features"]
+    line = refuse(1, *words, "missing.txt")
+    assert line == "anisomesh: error: missing.txt: cannot be read: No such file or directory"
+    (tmp_path / "pairs.bin").write_bytes(b"\xff\xfe\x00")
+    assert "pairs.bin: cannot be read as text" in refuse(1, *words, "pairs.bin")
 
 
 @pytest.mark.parametrize(

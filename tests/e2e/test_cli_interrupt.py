@@ -46,6 +46,20 @@ def test_interrupt_leaves_no_file(large_torus_obj, tmp_path):
     assert list(tmp_path.iterdir()) == []
 
 
+@pytest.mark.skipif(sys.platform == "win32", reason="Windows has no SIGINT for a single process")
+def test_interrupt_while_modules_are_imported_is_one_line(tmp_path):
+    """The signal comes from a module that the command line imports, so that no clock is involved."""
+    (tmp_path / "typer.py").write_text("import os, signal\nos.kill(os.getpid(), signal.SIGINT)\n")
+    code = "import signal, runpy; signal.signal(signal.SIGINT, signal.default_int_handler); "
+    code += "runpy.run_module('anisomesh', run_name='__main__')"
+    path = os.pathsep.join([str(tmp_path), *sys.path])
+    env = {**os.environ, "PYTHONPATH": path}
+    done = subprocess.run(
+        [sys.executable, "-c", code], check=False, capture_output=True, text=True, timeout=60, env=env
+    )
+    assert (done.returncode, done.stderr) == (130, "anisomesh: interrupted\n")
+
+
 def test_killed_at_any_moment_the_old_file_or_the_whole_new_one_is_there(torus_obj, tmp_path):
     """Runs are killed ever later, until one is through; where it writes, the moments are close together."""
     out = tmp_path / "out.ply"

@@ -81,8 +81,8 @@ def test_noisy_scan_is_better_with_the_network(tmp_path, capsys):
 @pytest.mark.slow
 def test_own_metric_source_stretches_triangles_around_the_axis(tmp_path):
     plain, around, curvature = example("own_metric_source").main(str(tmp_path / "source.png"), n_vertices=300)
-    assert plain.stretch.achieved_mean == pytest.approx(1.0, abs=1e-6)
-    assert around.stretch.achieved_mean > 3.0
+    assert plain.embedding.stretch.achieved_mean == pytest.approx(1.0, abs=1e-6)
+    assert around.embedding.stretch.achieved_mean > 3.0
     assert curvature.embedding_name == "direct"
     middle = around.surface.points[around.surface.edges].mean(axis=1)
     edge = np.diff(around.surface.points[around.surface.edges], axis=1)[:, 0]

@@ -95,6 +95,8 @@ def test_triangles_are_smaller_where_the_density_is_larger():
         ({"density": -np.ones(SURFACE.n_points)}, "positive"),
         ({"energy": 7.0}, "expected an object with evaluate"),
         ({"energy": NormalMetric(3.0), "sharpness": 5.0}, "sharpness belongs to the built-in energy"),
+        ({"energy": NormalMetric(3.0), "final_sharpness": 30.0}, "in place of yours"),
+        ({"energy": NormalMetric}, "is a class"),
         ({"embedding": 3}, "expected a name or an embedder"),
     ],
 )

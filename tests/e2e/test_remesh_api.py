@@ -166,6 +166,18 @@ def test_an_exception_in_the_callback_ends_the_work(ring):
         ({"n_vertices": 3}, "at least 4"),
         ({"n_vertices": 0}, "at least 4"),
         ({"n_vertices": 10.5}, "whole number"),
+        ({"n_vertices": 10.0}, "whole number"),
+        ({"n_vertices": float("nan")}, "whole number"),
+        ({"n_vertices": True}, "whole number"),
+        ({"ratio": "0.5"}, "ratio = '0.5'; expected a number"),
+        ({"max_error": "0.1%"}, "expected a number"),
+        ({"n_vertices": 100, "sharpness": "7"}, "expected a number"),
+        ({"n_vertices": 100, "seed": 1.5}, "whole number"),
+        ({"n_vertices": 100, "denoise": "no"}, "True or False"),
+        ({"n_vertices": 100, "weights": 7}, "name of a network"),
+        ({"n_vertices": 100, "weld_tolerance": -1.0}, "at least 0"),
+        ({"n_vertices": 100, "options": {}}, "expected RemeshOptions"),
+        ({"n_vertices": 100, "metric": anisomesh.Curvature}, "is a class"),
         ({"ratio": 0.0}, "positive number"),
         ({"ratio": float("nan")}, "positive number"),
         ({"n_vertices": 100, "sharpness": 0.5}, "at least 1"),
@@ -182,10 +194,31 @@ def test_options_out_of_range_are_refused(ring, options, words):
 
 
 def test_a_metric_of_the_wrong_shape_or_sign_is_refused(ring):
-    with pytest.raises(MetricError, match="one value for each point"):
+    with pytest.raises(MetricError, match="metric has shape"):
         anisomesh.remesh(ring, n_vertices=100, metric=np.eye(3)[None])
     with pytest.raises(MetricError, match="positive definite"):
         anisomesh.remesh(ring, n_vertices=100, metric=np.broadcast_to(-np.eye(3), (ring.n_points, 3, 3)))
+
+
+def test_a_wrong_tensor_is_named_by_the_point_of_the_input():
+    """Its index and its values are the user's, also where points before it are unused; those may have any tensor."""
+    base = torus(1.0, 0.3, 16, 8)
+    surface = Surface(np.concatenate([np.full((3, 3), 7.0), base.points]), base.faces + 3)
+    tensors = np.tile(np.eye(3), (surface.n_points, 1, 1))
+    tensors[:3] = 0.0
+    anisomesh.remesh(surface, n_vertices=40, metric=tensors, **FEW)
+    tensors[10] = np.diag([1.0, 2.0, -5.0])
+    with pytest.raises(MetricError, match=r"metric\[10\] = .*-5\.0.*\(1 such points\)"):
+        anisomesh.remesh(surface, n_vertices=40, metric=tensors)
+    with pytest.raises(OptionError, match=r"density\[10\] = 0"):
+        anisomesh.remesh(surface, n_vertices=40, density=np.where(np.arange(surface.n_points) == 10, 0.0, 1.0))
+
+
+def test_the_report_has_the_stretch_of_the_triangles(result):
+    report = result.report()
+    assert report["stretch"]["mean"] == pytest.approx(result.surface.face_stretch.mean())
+    assert report["stretch"]["max"] == pytest.approx(result.surface.face_stretch.max())
+    assert report["stretch_of_embedding"]["max"] == result.embedding.stretch.achieved_max
 
 
 def test_values_that_are_not_meshes_are_refused():

@@ -7,7 +7,7 @@ import pytest
 from PIL import Image
 
 from anisomesh import AnisomeshError, OptionError, Surface
-from anisomesh.viz import CellPolygons, renderer, require_renderer, side_by_side, triangle_stretch
+from anisomesh.viz import CellPolygons, renderer, require_renderer, side_by_side
 from conftest import torus_arrays
 
 TITLES = ("same", "same", "cells")
@@ -59,7 +59,7 @@ def test_position_and_size_of_the_model_do_not_matter(torus, tmp_path):
 @pytest.mark.slow
 def test_values_colour_the_result_only(torus, tmp_path):
     plain = draw(tmp_path / "a.png", torus, torus)
-    image = draw(tmp_path / "b.png", torus, torus, values=triangle_stretch(torus))
+    image = draw(tmp_path / "b.png", torus, torus, values=torus.face_stretch)
     assert coloured(plain) < 0.01
     assert coloured(image[:, :800]) < 0.01
     assert coloured(image[:, 800:]) > 0.1

@@ -11,10 +11,10 @@ from hypothesis import strategies as st
 
 from anisomesh.delaunay.delta_complex import simplicial_mesh
 from anisomesh.mesh import topology
+from anisomesh.mesh.embedded_surface import EmbeddedSurface
 from anisomesh.mesh.surface import Surface
 from anisomesh.shapes import analytic as shapes
 from anisomesh.voronoi.cells import cell_complex
-from anisomesh.voronoi.embedded_surface import EmbeddedSurface
 from anisomesh.voronoi.restricted import RestrictedVoronoi
 from conftest import examples
 

@@ -6,11 +6,11 @@ from delaunay_cases import assert_closed_manifold, mesh_of
 
 from anisomesh.delaunay.noncontractible_loops import points_on_noncontractible_loops
 from anisomesh.mesh.closest_points import ClosestPoints
+from anisomesh.mesh.embedded_surface import EmbeddedSurface
 from anisomesh.mesh.surface import Surface
 from anisomesh.shapes import analytic as shapes
 from anisomesh.shapes.patches import grid_faces
 from anisomesh.voronoi.cells import cell_complex
-from anisomesh.voronoi.embedded_surface import EmbeddedSurface
 from anisomesh.voronoi.restricted import RestrictedVoronoi
 
 

@@ -17,10 +17,10 @@ from anisomesh.delaunay.placement import (
 )
 from anisomesh.features.detect import corners, sharp_edges
 from anisomesh.mesh.closest_points import ClosestPoints
+from anisomesh.mesh.embedded_surface import EmbeddedSurface
 from anisomesh.mesh.surface import Surface
 from anisomesh.shapes.analytic import box
 from anisomesh.voronoi.cells import cell_complex
-from anisomesh.voronoi.embedded_surface import EmbeddedSurface
 from anisomesh.voronoi.restricted import RestrictedVoronoi
 
 

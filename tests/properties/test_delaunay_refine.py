@@ -10,11 +10,11 @@ from anisomesh.cvt.lloyd import lloyd
 from anisomesh.delaunay import meshing
 from anisomesh.mesh import topology
 from anisomesh.mesh.distance import surface_distance
+from anisomesh.mesh.embedded_surface import EmbeddedSurface
 from anisomesh.mesh.surface import Surface
 from anisomesh.mesh.validity import check_validity
 from anisomesh.shapes import analytic as shapes
 from anisomesh.voronoi.cells import cell_complex
-from anisomesh.voronoi.embedded_surface import EmbeddedSurface
 from anisomesh.voronoi.restricted import RestrictedVoronoi
 from conftest import pairwise
 

@@ -15,10 +15,10 @@ from anisomesh.features.boundary import trace_boundary
 from anisomesh.features.detect import sharp_edges
 from anisomesh.features.network import trace_features
 from anisomesh.mesh import topology
+from anisomesh.mesh.embedded_surface import EmbeddedSurface
 from anisomesh.mesh.surface import Surface
 from anisomesh.pipeline import remesh
 from anisomesh.shapes.analytic import open_patch, sphere
-from anisomesh.voronoi.embedded_surface import EmbeddedSurface
 from anisomesh.voronoi.intervals import boundary_intervals
 from anisomesh.voronoi.restricted import RestrictedVoronoi
 
@@ -140,7 +140,7 @@ def test_intervals_divide_the_boundary_among_the_nearest_sites(name, n_sites):
     embedded = EmbeddedSurface.in_space(surface)
     sites = naive.random_sites(surface.points, surface.faces, n_sites, np.random.default_rng(n_sites))
     sharp = sharp_edges(embedded.surface, 45.0)
-    features = trace_features(embedded.points, embedded.surface, n_sites, embedded.site_spacing(n_sites), sharp=sharp)
+    features = trace_features(embedded, n_sites, sharp=sharp)
     loops = features.boundary
     intervals = boundary_intervals(features, RestrictedVoronoi(embedded).diagram(sites))
     total = np.bincount(intervals.polyline, intervals.length, minlength=loops.n_polylines)
@@ -182,7 +182,7 @@ def test_spread_sites_are_on_the_boundary_one_for_each_long_interval():
     voronoi = RestrictedVoronoi(embedded)
     sites = naive.random_sites(surface.points, surface.faces, 100, np.random.default_rng(0))
     none = np.zeros(len(embedded.surface.edges), dtype=bool)
-    features = trace_features(embedded.points, embedded.surface, 100, embedded.site_spacing(100), sharp=none)
+    features = trace_features(embedded, 100, sharp=none)
     spread = spread_on_features(features, voronoi, ConstrainedSites.free(lloyd(voronoi, sites, 5)))
     positions, on_boundary = spread.positions, spread.on_boundary
     assert not spread.on_crease.any()

@@ -11,12 +11,12 @@ from anisomesh.features.detect import corners, sharp_edges
 from anisomesh.features.network import trace_features
 from anisomesh.mesh import topology
 from anisomesh.mesh.closest_points import ClosestPoints
+from anisomesh.mesh.embedded_surface import EmbeddedSurface
 from anisomesh.mesh.surface import Surface
 from anisomesh.meshops.collapse import decimate
 from anisomesh.meshops.edge_recovery import recover_edges
 from anisomesh.meshops.flip import flip_for_shape
 from anisomesh.shapes.analytic import box, cad_part, cylinder, open_patch, sphere
-from anisomesh.voronoi.embedded_surface import EmbeddedSurface
 from anisomesh.voronoi.intervals import crease_intervals
 from anisomesh.voronoi.restricted import RestrictedVoronoi
 
@@ -39,8 +39,7 @@ def crease_case(name, n_sites, seed=0):
     embedded = EmbeddedSurface.in_space(surface)
     sharp = sharp_edges(embedded.surface, 40.0)
     sites = naive.random_sites(surface.points, surface.faces, n_sites, np.random.default_rng(seed))
-    spacing = embedded.site_spacing(n_sites)
-    features = trace_features(embedded.points, embedded.surface, n_sites, spacing, sharp=sharp, required=sharp)
+    features = trace_features(embedded, n_sites, sharp=sharp, required=sharp)
     return RestrictedVoronoi(embedded), sites, features
 
 

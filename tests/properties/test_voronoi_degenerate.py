@@ -7,10 +7,10 @@ from embedded import embedded_surface
 from hypothesis import given
 from hypothesis import strategies as st
 
+from anisomesh.mesh.embedded_surface import EmbeddedSurface
 from anisomesh.mesh.surface import Surface
 from anisomesh.shapes import analytic as shapes
 from anisomesh.voronoi.cells import cell_complex
-from anisomesh.voronoi.embedded_surface import EmbeddedSurface
 from anisomesh.voronoi.restricted import RestrictedVoronoi
 from conftest import examples
 

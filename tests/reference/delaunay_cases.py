@@ -8,9 +8,9 @@ from anisomesh.delaunay.meshing import MeshingTask, mesh_from_sites
 from anisomesh.features.detect import sharp_edges
 from anisomesh.features.network import trace_features
 from anisomesh.mesh import topology
+from anisomesh.mesh.embedded_surface import EmbeddedSurface
 from anisomesh.metric.tensors import uniform_metric
 from anisomesh.voronoi.cells import cell_complex
-from anisomesh.voronoi.embedded_surface import EmbeddedSurface
 from anisomesh.voronoi.restricted import RestrictedVoronoi
 
 
@@ -25,9 +25,7 @@ def mesh_of(voronoi, sites, crease_angle=180.0, required=False):
     """Return the valid mesh of these sites, with as many vertices asked for as there are sites."""
     embedded, n = voronoi.embedded, len(sites)
     sharp = sharp_edges(embedded.surface, crease_angle)
-    features = trace_features(
-        embedded.points, embedded.surface, n, embedded.site_spacing(n), sharp=sharp, required=sharp & required
-    )
+    features = trace_features(embedded, n, sharp=sharp, required=sharp & required)
     task = MeshingTask(
         voronoi=voronoi,
         features=features,

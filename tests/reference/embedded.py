@@ -1,7 +1,7 @@
 """Embedded surfaces of bare arrays."""
 
+from anisomesh.mesh.embedded_surface import EmbeddedSurface
 from anisomesh.mesh.surface import Surface
-from anisomesh.voronoi.embedded_surface import EmbeddedSurface
 
 
 def embedded_surface(points, faces, scale=1.0):

@@ -10,6 +10,31 @@ import anisomesh
 from anisomesh import ConformanceError, MetricError, MetricField, NormalMetric, OptionError
 
 
+class Wrong:
+    def __init__(self, **changes):
+        self.changes = changes
+
+    def evaluate(self, voronoi, sites):
+        value = voronoi.integrate(sites)
+        return replace(value, **{name: change(getattr(value, name)) for name, change in self.changes.items()})
+
+
+ENERGY_FAULTS = [
+    ("mass", lambda mass: -mass, "no negative mass"),
+    ("mass", lambda mass: None, "mass of the energy"),
+    ("per_cell", lambda energy: energy[:-1], "per_cell of the energy has shape"),
+    ("gradient", lambda gradient: gradient[:, :3], "gradient of the energy has shape"),
+    (
+        "gradient",
+        lambda gradient: np.full_like(gradient, np.nan),
+        "gradient of the energy has a number",
+    ),
+    ("gradient", lambda gradient: gradient + 0j, "real numbers"),
+    ("value", lambda value: np.nan, "value of the energy has a number that is not finite"),
+    ("value", lambda value: np.array([value]), "value of the energy has shape"),
+]
+
+
 @pytest.mark.parametrize("source", [anisomesh.Curvature(), anisomesh.Approximation(), anisomesh.Uniform()])
 def test_built_in_metric_sources_conform(source):
     assert anisomesh.check_metric_source(source).tensors.shape[1:] == (3, 3)
@@ -21,11 +46,39 @@ def test_built_in_metric_sources_conform(source):
         (lambda n: np.tile(-np.eye(3), (n, 1, 1)), "positive definite"),
         (lambda n: np.eye(3), "shape"),
         (lambda n: np.full((n, 3, 3), np.nan), "not finite"),
+        (lambda n: np.tile((1 + 1j) * np.eye(3), (n, 1, 1)), "real numbers: type complex128"),
+        (lambda n: np.tile(1e300 * np.eye(3), (n, 1, 1)), "above 1e"),
+        (lambda n: np.tile(1e-300 * np.eye(3), (n, 1, 1)), "no entry above 1e-100"),
+        (lambda n: np.tile(np.diag([1e14, 1.0, 1.0]), (n, 1, 1)), "nearly singular"),
+        (lambda n: None, "cannot be read as real numbers|has shape"),
     ],
 )
 def test_tensors_that_are_not_a_metric_are_found(tensors, message):
     with pytest.raises(MetricError, match=message):
         anisomesh.check_metric_source(lambda surface: MetricField(tensors=tensors(surface.n_points)))
+
+
+def test_tensors_in_lists_and_single_precision_are_a_metric():
+    for form in (list, lambda array: array.astype(np.float32)):
+        field = anisomesh.check_metric_source(
+            lambda surface, form=form: MetricField(tensors=form(np.tile(np.eye(3), (surface.n_points, 1, 1))))
+        )
+        assert field.tensors.dtype == np.float64
+
+
+def test_what_is_not_a_plug_in_is_refused():
+    with pytest.raises(ConformanceError, match="callable"):
+        anisomesh.check_metric_source(np.eye(3))
+    with pytest.raises(OptionError, match="is a class; expected an object"):
+        anisomesh.check_metric_source(anisomesh.Curvature)
+    with pytest.raises(OptionError, match="is a class; expected an object"):
+        anisomesh.check_embedder(anisomesh.Direct)
+    with pytest.raises(OptionError, match="a name or an embedder"):
+        anisomesh.check_embedder(None)
+    with pytest.raises(OptionError, match="is a class; expected an object"):
+        anisomesh.check_energy_gradient(NormalMetric)
+    with pytest.raises(OptionError, match="evaluate"):
+        anisomesh.check_energy_gradient(7.0)
 
 
 def test_other_faults_of_metric_sources_are_found():
@@ -47,8 +100,10 @@ def test_the_direct_embedding_conforms_and_wrong_ones_are_found():
         anisomesh.check_embedder(lambda surface, field: replace(direct(surface, field), scale=2.0))
     with pytest.raises(OptionError, match="expected an Embedding"):
         anisomesh.check_embedder(lambda surface, field: surface.points)
-    with pytest.raises(OptionError, match="points of shape"):
+    with pytest.raises(OptionError, match="points of the embedding has shape"):
         anisomesh.check_embedder(lambda surface, field: replace(direct(surface, field), points=surface.points[:-1]))
+    with pytest.raises(OptionError, match="stretch = None; expected StretchStatistics"):
+        anisomesh.check_embedder(lambda surface, field: replace(direct(surface, field), stretch=None))
 
 
 @pytest.mark.slow
@@ -62,21 +117,16 @@ def test_faults_of_energies_are_found():
     with pytest.raises(ConformanceError, match="off central differences"):
         anisomesh.check_energy_gradient(anisomesh.energy_from_kernel(without_site_gradient))
 
-    class Wrong:
-        def __init__(self, **changes):
-            self.changes = changes
-
-        def evaluate(self, voronoi, sites):
-            value = voronoi.integrate(sites)
-            return replace(value, **{name: change(getattr(value, name)) for name, change in self.changes.items()})
-
-    for name, change, message in (
-        ("mass", lambda mass: -mass, "no negative mass"),
-        ("per_cell", lambda energy: 2.0 * energy, "adds up to"),
-        ("gradient", lambda gradient: gradient[:, :3], "gradient has shape"),
-        ("gradient", lambda gradient: np.full_like(gradient, np.nan), "gradient has a value that is not finite"),
-        ("value", lambda value: np.nan, "value has a value that is not finite"),
-        ("value", lambda value: np.array([value]), "value has shape"),
-    ):
-        with pytest.raises(ConformanceError, match=message):
+    for name, change, message in ENERGY_FAULTS:
+        with pytest.raises(OptionError, match=message):
             anisomesh.check_energy_gradient(Wrong(**{name: change}))
+    with pytest.raises(ConformanceError, match="adds up to"):
+        anisomesh.check_energy_gradient(Wrong(per_cell=lambda energy: 2.0 * energy))
+    with pytest.raises(ConformanceError, match="every mass is 0"):
+        anisomesh.check_energy_gradient(Wrong(mass=np.zeros_like))
+
+
+@pytest.mark.parametrize(("name", "change", "message"), ENERGY_FAULTS)
+def test_a_remesh_ends_at_the_first_wrong_value_of_an_energy(name, change, message):
+    with pytest.raises(OptionError, match=message):
+        anisomesh.remesh(anisomesh.sample("ring"), n_vertices=60, embedding="direct", energy=Wrong(**{name: change}))

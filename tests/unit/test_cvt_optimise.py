@@ -11,8 +11,8 @@ from anisomesh.cvt.energy import NormalMetric
 from anisomesh.cvt.lbfgs import DescentOptions, Status
 from anisomesh.cvt.lloyd import lloyd
 from anisomesh.cvt.sampling import sample_surface
+from anisomesh.mesh.embedded_surface import EmbeddedSurface
 from anisomesh.shapes import analytic as shapes
-from anisomesh.voronoi.embedded_surface import EmbeddedSurface
 from anisomesh.voronoi.restricted import EnergyValue, RestrictedVoronoi
 
 

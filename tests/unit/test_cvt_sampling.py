@@ -6,8 +6,8 @@ import pytest
 
 from anisomesh.cvt.energy import NormalMetric
 from anisomesh.cvt.sampling import resample_by_energy, sample_surface
+from anisomesh.mesh.embedded_surface import EmbeddedSurface
 from anisomesh.shapes import analytic as shapes
-from anisomesh.voronoi.embedded_surface import EmbeddedSurface
 from anisomesh.voronoi.restricted import RestrictedVoronoi
 
 

@@ -11,7 +11,7 @@ PROGRAM = """
 import numpy as np
 import pytest
 from anisomesh._kernels import predicates, warmup
-from anisomesh.voronoi.embedded_surface import EmbeddedSurface
+from anisomesh.mesh.embedded_surface import EmbeddedSurface
 from anisomesh.voronoi.restricted import RestrictedVoronoi
 from anisomesh.shapes import analytic as shapes
 surface = shapes.box(n=1)

@@ -2,6 +2,8 @@
 
 import numpy as np
 import pytest
+from hypothesis import given
+from hypothesis import strategies as st
 
 from anisomesh.errors import MeshError
 from anisomesh.mesh.geometry import thickness, unit_frame
@@ -22,6 +24,8 @@ POINTS = np.array([[0.0, 0, 0], [1, 0, 0], [0, 1, 0], [0, 0, 1]])
         (POINTS, [[0, 1, 2], [0, 1, 4]], r"faces\[1\] = \[0, 1, 4\].*4 points"),
         (POINTS, [[0, -1, 2]], "out of range"),
         (POINTS, [[0, 1, 2**32]], "out of range"),
+        (POINTS + 1j, [[0, 1, 2]], "points has dtype complex128; expected real numbers"),
+        ("a", "b", "expected real numbers"),
     ],
 )
 def test_bad_arrays_are_refused(points, faces, message):
@@ -83,3 +87,22 @@ def test_thickness_of_known_triangles():
     np.testing.assert_allclose(
         thickness(np.stack([regular, right, flat, point])), [np.sqrt(3) / 4, 6 / 25, 0, 0], atol=1e-15
     )
+
+
+def rotation(seed):
+    q, r = np.linalg.qr(np.random.default_rng(seed).normal(size=(3, 3)))
+    q = q * np.sign(np.diag(r))
+    return q * np.linalg.det(q)
+
+
+@given(st.floats(1.0, 50.0), st.floats(0.0, 2 * np.pi), st.floats(1e-3, 1e3), st.integers(0, 1000))
+def test_stretching_an_equilateral_triangle_by_r_gives_r(r, direction, size, seed):
+    angles = direction + 2 * np.pi * np.arange(3) / 3
+    flat = np.stack([r * np.cos(angles), np.sin(angles), np.zeros(3)], axis=1)
+    surface = Surface(size * flat @ rotation(seed).T, np.array([[0, 1, 2]]))
+    assert surface.face_stretch == pytest.approx([r], rel=1e-5, abs=1e-5)
+
+
+def test_a_triangle_without_area_is_stretched_without_limit():
+    surface = Surface(np.array([[0.0, 0, 0], [1, 0, 0], [2, 0, 0]]), np.array([[0, 1, 2], [0, 0, 0]]))
+    assert np.isposinf(surface.face_stretch).all()

@@ -6,7 +6,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from anisomesh.mesh.surface import Surface
-from anisomesh.viz.view import closeup, triangle_stretch, whole_view
+from anisomesh.viz.view import closeup, whole_view
 from conftest import torus_arrays
 
 ASPECT = 1.6
@@ -20,25 +20,6 @@ def grid(xs, ys, height=0.0):
     a, b, c, d = (index[:-1, :-1], index[1:, :-1], index[1:, 1:], index[:-1, 1:])
     faces = np.concatenate([np.stack(t, axis=-1).reshape(-1, 3) for t in ((a, b, c), (a, c, d))])
     return points, faces
-
-
-def rotation(seed):
-    q, r = np.linalg.qr(np.random.default_rng(seed).normal(size=(3, 3)))
-    q = q * np.sign(np.diag(r))
-    return q * np.linalg.det(q)
-
-
-@given(st.floats(1.0, 50.0), st.floats(0.0, 2 * np.pi), st.floats(1e-3, 1e3), st.integers(0, 1000))
-def test_stretching_an_equilateral_triangle_by_r_gives_r(r, direction, size, seed):
-    angles = direction + 2 * np.pi * np.arange(3) / 3
-    flat = np.stack([r * np.cos(angles), np.sin(angles), np.zeros(3)], axis=1)
-    surface = Surface(size * flat @ rotation(seed).T, np.array([[0, 1, 2]]))
-    assert triangle_stretch(surface) == pytest.approx([r], rel=1e-5, abs=1e-5)
-
-
-def test_a_triangle_without_area_is_stretched_without_limit():
-    surface = Surface(np.array([[0.0, 0, 0], [1, 0, 0], [2, 0, 0]]), np.array([[0, 1, 2], [0, 0, 0]]))
-    assert np.isposinf(triangle_stretch(surface)).all()
 
 
 @given(st.integers(0, 10_000), st.tuples(*[st.floats(0.01, 100.0)] * 3))

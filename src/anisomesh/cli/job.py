@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import tempfile
 import time
 from dataclasses import dataclass
 from pathlib import Path
@@ -31,13 +32,18 @@ class Outputs:
         """The requested files, in the order of writing."""
         return [path for path in (self.mesh, self.report, self.rvd, self.picture) if path is not None]
 
-    def check(self) -> None:
-        """Check before a long computation that every file can be written.
+    def check(self, *inputs: Path | None) -> None:
+        """Check before a long computation that every file can be written and none replaces an input by accident.
+
+        Parameters
+        ----------
+        *inputs
+            Files that the command reads. Only the mesh may have the name of one, its own input, and replaces it.
 
         Raises
         ------
         typer.BadParameter
-            If a folder does not exist, a path is a folder or used twice, or a suffix is wrong.
+            If a folder does not exist or cannot be written, a path is a folder or used twice, or a suffix is wrong.
         AnisomeshError
             If a picture was requested and nothing can be drawn on this machine.
         """
@@ -45,6 +51,10 @@ class Outputs:
             check_output_path(path)
         if len({path.resolve() for path in self.paths}) < len(self.paths):
             raise typer.BadParameter("two outputs have the same file name; give each its own")
+        read_only = inputs[1:]
+        for path in self.paths:
+            if any(_same_file(path, other) for other in (read_only if path is self.mesh else inputs) if other):
+                raise typer.BadParameter(f"{path} is an input and would be overwritten; give another name")
         from anisomesh.io.meshes import MESH_FORMATS
 
         if self.mesh.suffix.lower() not in MESH_FORMATS:
@@ -79,12 +89,21 @@ def check_output_path(path: Path) -> None:
     Raises
     ------
     typer.BadParameter
-        If its folder does not exist or the path is a folder.
+        If its folder does not exist or cannot be written, or the path is a folder.
     """
     if path.is_dir():
         raise typer.BadParameter(f"{path} is a folder; give the name of a file in it")
     if not path.parent.is_dir():
         raise typer.BadParameter(f"{path}: there is no folder {path.parent}; create it first")
+    try:
+        with tempfile.NamedTemporaryFile(dir=path.parent, prefix="."):
+            pass
+    except OSError as error:
+        raise typer.BadParameter(f"{path} cannot be written: {error.strerror}") from None
+
+
+def _same_file(path: Path, other: Path) -> bool:
+    return path.exists() and other.exists() and path.samefile(other)
 
 
 def check_picture_path(path: Path, option: str) -> None:

@@ -54,11 +54,6 @@ def _main(
         raise typer.Exit(2)
 
 
-def run() -> None:
-    """Run the command line with the arguments of the process and exit with its status."""
-    sys.exit(main(sys.argv[1:]))
-
-
 def main(arguments: list[str]) -> int:
     """Run the command line and return its exit code.
 
@@ -83,7 +78,7 @@ def main(arguments: list[str]) -> int:
         os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
         return 1
     except OSError as error:
-        return _fail(f"{error.filename}: {error.strerror}" if error.filename else str(error), 1)
+        return _fail(f"{error.filename or 'output'}: {error.strerror or error}", 1)
     except MemoryError:
         return _fail("out of memory; ask for fewer vertices or use a machine with more memory", 1)
     except (KeyboardInterrupt, typer.Abort):
@@ -102,4 +97,5 @@ def _usage_message(error: Exception) -> str:
     context = getattr(error, "ctx", None)
     command = context.command_path if context else "anisomesh"
     message = error.format_message() if hasattr(error, "format_message") else str(error)
+    message = message.replace("Value error, ", "")  # a prefix of some versions of typer
     return f"{message.rstrip('.')}; see '{command} --help'"

@@ -55,7 +55,8 @@ def command(
         raise typer.BadParameter("give one of -n (number of vertices), --ratio and --max-error")
     error = None if max_error is None else Length.parse(max_error, "--max-error")
     outputs = Outputs(mesh=out, report=report, rvd=rvd, picture=picture)
-    outputs.check()
+    weights = options.get("weights")
+    outputs.check(source, features, None if weights is None else Path(weights))
     with progress(quiet) as display:
         surface, seconds = read(source)
         if features is not None:

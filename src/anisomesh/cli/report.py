@@ -72,7 +72,10 @@ def summary(report: dict[str, Any], written: Sequence[Path], notes: Sequence[str
         ("faces", f"{report['faces']:,}"),
         ("surface", describe_validity(report["validity"])),
         *([("distance", f"at most {report['distance']:.4g} from the input")] if report.get("distance") else []),
-        ("stretch", f"mean {stretch['mean']:.2f}, largest {stretch['max']:.2f} (1 = equilateral)"),
+        (
+            "stretch",
+            f"mean {stretch['mean']:.2f}, largest {stretch['max']:.2f} (of the triangles; 1 = equilateral)",
+        ),
         ("embedding", _METRIC_SOURCES[report["embedding"]]),
         ("optimiser", f"{counted(report['iterations'], 'iteration')}{energy}: {report['status']}"),
         ("seconds", f"{seconds['total']:.2f} ({stages})"),

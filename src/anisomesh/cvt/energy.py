@@ -3,11 +3,12 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Protocol
+from typing import Any, Protocol
 
 import numpy as np
+import numpy.typing as npt
 
-from anisomesh._arrays import Sites
+from anisomesh._arrays import Sites, real_array
 from anisomesh.errors import OptionError
 from anisomesh.voronoi.restricted import EnergyValue, RestrictedVoronoi
 
@@ -18,6 +19,35 @@ class Energy(Protocol):
     def evaluate(self, voronoi: RestrictedVoronoi, sites: Sites, /) -> EnergyValue:
         """Return the energy of sites (S, d), its gradient, and mass and energy of each cell."""
         ...
+
+
+def evaluate_energy(energy: Energy, voronoi: RestrictedVoronoi, sites: Sites) -> EnergyValue:
+    """Return the value of an energy for sites (S, d) after validation, in arrays of its own.
+
+    Raises
+    ------
+    OptionError
+        If it is not an :class:`~anisomesh.voronoi.restricted.EnergyValue`, a shape is wrong, a number is not finite or
+        not real, or a mass is negative.
+    """
+    found = energy.evaluate(voronoi, sites)
+    if not isinstance(found, EnergyValue):
+        raise OptionError(f"the energy returned {type(found).__name__}; expected an EnergyValue")
+    n = len(sites)
+    value = _finite("value", found.value, ())
+    gradient = _finite("gradient", found.gradient, sites.shape)
+    mass, per_cell = _finite("mass", found.mass, (n,)), _finite("per_cell", found.per_cell, (n,))
+    if n and mass.min() < 0.0:
+        raise OptionError(f"mass[{np.argmin(mass)}] of the energy is {mass.min():g}; expected no negative mass")
+    return EnergyValue(value=float(value), gradient=gradient, mass=mass, per_cell=per_cell)
+
+
+def _finite(name: str, values: Any, shape: tuple[int, ...]) -> npt.NDArray[np.float64]:
+    """Return a field of an energy as a new array after validation."""
+    array = real_array(f"{name} of the energy", values, shape, OptionError)
+    if not np.isfinite(array).all():
+        raise OptionError(f"{name} of the energy has a number that is not finite")
+    return array
 
 
 @dataclass(frozen=True)

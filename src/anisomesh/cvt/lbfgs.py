@@ -11,7 +11,7 @@ import numpy as np
 import numpy.typing as npt
 
 from anisomesh._arrays import Sites
-from anisomesh.cvt.energy import Energy
+from anisomesh.cvt.energy import Energy, evaluate_energy
 from anisomesh.cvt.lloyd import OnIteration, divide_rows
 from anisomesh.deadline import NO_DEADLINE, Deadline
 from anisomesh.voronoi.restricted import EnergyValue, RestrictedVoronoi
@@ -122,7 +122,7 @@ def minimise(
     """
 
     def evaluate(positions: Sites) -> EnergyValue:
-        value = energy.evaluate(voronoi, positions)
+        value = evaluate_energy(energy, voronoi, positions)
         if fixed is not None:
             value.gradient[fixed] = 0.0
         return value

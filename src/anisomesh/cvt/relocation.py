@@ -8,7 +8,7 @@ from scipy.spatial import cKDTree
 
 from anisomesh._arrays import EmbeddedPoints, PointScalars
 from anisomesh.cvt.constraints import ConstrainedSites
-from anisomesh.cvt.energy import Energy
+from anisomesh.cvt.energy import Energy, evaluate_energy
 from anisomesh.voronoi.restricted import RestrictedVoronoi
 
 # heuristics, chosen on procedural parts and training meshes
@@ -66,7 +66,7 @@ def relocate_to_creases(
 
 def _least_important(voronoi: RestrictedVoronoi, sites: ConstrainedSites, energy: Energy) -> npt.NDArray[np.int64]:
     """Return the free sites (n,), the one with the least energy in its cell first."""
-    order = np.argsort(energy.evaluate(voronoi, sites.positions).per_cell, kind="stable")
+    order = np.argsort(evaluate_energy(energy, voronoi, sites.positions).per_cell, kind="stable")
     return np.asarray(order[~sites.fixed[order]])
 
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from anisomesh._arrays import EmbeddedPoints, Faces, FaceScalars, Sites
-from anisomesh.cvt.energy import Energy
+from anisomesh.cvt.energy import Energy, evaluate_energy
 from anisomesh.voronoi.restricted import RestrictedVoronoi
 
 
@@ -60,7 +60,7 @@ def resample_by_energy(voronoi: RestrictedVoronoi, sites: Sites, energy: Energy,
     density is the area times the square root of (energy / area^2) of the cell, which is constant where the plain
     energy dominates and grows where the surface leaves the tangent plane within a cell.
     """
-    value = energy.evaluate(voronoi, sites)
+    value = evaluate_energy(energy, voronoi, sites)
     diagram, embedded = voronoi.diagram(sites), voronoi.embedded
     area = value.mass
     if embedded.density is not None:

@@ -9,10 +9,10 @@ from scipy.spatial import cKDTree
 from anisomesh._arrays import EmbeddedPoints, Faces, Points, Sites
 from anisomesh.delaunay.creases import MIN_SITE_DISTANCE
 from anisomesh.mesh.closest_points import ClosestPoints
+from anisomesh.mesh.embedded_surface import EmbeddedSurface
 from anisomesh.mesh.geometry import is_flat
 from anisomesh.mesh.surface import Surface
 from anisomesh.mesh.validity import inverted_faces, new_intersections
-from anisomesh.voronoi.embedded_surface import EmbeddedSurface
 
 
 def faulty_faces(points: Points, faces: Faces, reference: ClosestPoints) -> npt.NDArray[np.int64]:

@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+from numbers import Real
 from typing import Any, Protocol
 
 import numpy as np
 
-from anisomesh.embedding.base import Embedding
+from anisomesh._arrays import real_array
+from anisomesh.embedding.base import Embedding, EmbeddingStatus, StretchStatistics
 from anisomesh.embedding.direct import embed
 from anisomesh.embedding.precomputed import precomputed_embedding
 from anisomesh.errors import OptionError
@@ -59,22 +61,27 @@ class Direct:
 
 
 def checked_embedding(embedding: Any, surface: Surface) -> Embedding:
-    """Return the result of an embedder for a surface after validation.
+    """Return the result of an embedder for a surface after validation, its points in float64.
 
     Raises
     ------
     OptionError
-        If it is not an :class:`~anisomesh.embedding.base.Embedding`, its points are not finite (V, d) with d >= 3, or
-        the first three columns are not ``scale`` > 0 times the points of the surface.
+        If it is not an :class:`~anisomesh.embedding.base.Embedding`, its points are not real, finite and (V, d) with
+        d >= 3, the first three columns are not ``scale`` > 0 times the points of the surface, or a field is missing.
     """
     if not isinstance(embedding, Embedding):
         raise OptionError(f"the embedder returned {type(embedding).__name__}; expected an Embedding")
-    points, n = np.asarray(embedding.points), surface.n_points
-    if points.ndim != 2 or len(points) != n or points.shape[1] < 3 or not np.isfinite(points).all():
-        raise OptionError(f"the embedding has points of shape {points.shape}; expected finite ({n}, d) with d >= 3")
+    kinds = {"scale": Real, "residual": Real, "status": EmbeddingStatus, "stretch": StretchStatistics}
+    for name, kind in kinds.items():
+        if not isinstance(value := getattr(embedding, name), kind):
+            raise OptionError(f"the embedding has {name} = {value!r}; expected {kind.__name__}")
+    dimension = np.shape(embedding.points)[-1] if np.ndim(embedding.points) == 2 else 3
+    points = real_array("points of the embedding", embedding.points, (surface.n_points, max(dimension, 3)), OptionError)
+    if not np.isfinite(points).all():
+        raise OptionError("points of the embedding has a number that is not finite")
     if not embedding.scale > 0.0:
         raise OptionError(f"the embedding has scale = {embedding.scale}; expected a positive number")
     off = np.abs(points[:, :3] - embedding.scale * surface.points).max()
     if off > 1e-9 * embedding.scale * max(surface.diagonal, 1.0):
         raise OptionError(f"the first three coordinates of the embedding are off scale times the surface by {off:.3g}")
-    return embedding
+    return replace(embedding, points=points)

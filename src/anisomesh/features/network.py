@@ -6,11 +6,12 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from anisomesh._arrays import EdgeMask, EmbeddedPoints
+from anisomesh._arrays import EdgeMask
+from anisomesh.errors import OptionError
 from anisomesh.features.boundary import BoundaryLoops, trace_boundary
 from anisomesh.features.creases import select_creases
 from anisomesh.features.polylines import FeaturePolylines, Floats, Ints
-from anisomesh.mesh.surface import Surface
+from anisomesh.mesh.embedded_surface import EmbeddedSurface
 
 _CORNER_SCALE = 0.75  # site spacings over which the turn of a boundary is measured; heuristic
 _MAX_CREASE_LENGTH = 1.2  # site spacings of crease for each site; longer networks leave no sites for the faces
@@ -51,31 +52,32 @@ class FeatureNetwork:
 
 
 def trace_features(
-    positions: EmbeddedPoints,
-    surface: Surface,
-    n_sites: int,
-    spacing: float,
-    *,
-    sharp: EdgeMask,
-    required: EdgeMask | None = None,
+    embedded: EmbeddedSurface, n_sites: int, *, sharp: EdgeMask, required: EdgeMask | None = None
 ) -> FeatureNetwork:
-    """Return the feature network of a surface for a number of sites.
+    """Return the feature network of an embedded surface for a number of sites.
 
     Parameters
     ----------
-    positions
-        The embedded points (V, d).
-    surface
-        The surface in space.
-    n_sites, spacing
-        Number of sites, and their distance in the embedding.
+    embedded
+        The embedded surface.
+    n_sites
+        Number of sites.
     sharp
         Which edges of the surface (E,) are on a crease.
     required
         Which of these (E,) are followed in any case; none by default.
+
+    Raises
+    ------
+    OptionError
+        If there is not one value per edge.
     """
+    positions, surface, spacing = embedded.points, embedded.surface, embedded.site_spacing(n_sites)
     if required is None:
         required = np.zeros_like(sharp)
+    for name, mask in (("sharp", sharp), ("required", required)):
+        if np.shape(mask) != (len(surface.edges),) or mask.dtype != bool:
+            raise OptionError(f"{name} is not a mask ({len(surface.edges)},) of the edges of the embedded surface")
     boundary = trace_boundary(positions, surface)
     crease_ends = np.unique(surface.edges[sharp]).astype(np.int64)
     corners, turns = boundary.corners(_CORNER_SCALE * spacing, crease_ends)

@@ -29,8 +29,10 @@ def load_pairs(path: str | os.PathLike[str]) -> npt.NDArray[np.int64]:
     """
     try:
         text = Path(path).read_text(encoding="utf-8")
-    except (OSError, UnicodeDecodeError) as error:
-        raise MeshFileError(f"{path}: cannot be read as text: {error}") from error
+    except OSError as error:
+        raise MeshFileError(f"{path}: cannot be read: {error.strerror}") from error
+    except UnicodeDecodeError as error:
+        raise MeshFileError(f"{path}: cannot be read as text; expected two vertex numbers per line") from error
     pairs = []
     for number, line in enumerate(text.splitlines(), start=1):
         words = line.split("#", 1)[0].split()

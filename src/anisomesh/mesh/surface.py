@@ -121,6 +121,22 @@ class Surface:
         return np.asarray(0.5 * np.linalg.norm(geometry.face_cross(self.points, self.faces), axis=1))
 
     @cached_property
+    def face_stretch(self) -> FaceScalars:
+        """Stretch of the faces (F,): 1 for an equilateral one, infinite for one without area.
+
+        Notes
+        -----
+        The ratio of the singular values of the linear map from an equilateral triangle. With side lengths a, b, c and
+        area A, ``q = (a^2 + b^2 + c^2) / (4 sqrt(3) A)`` is half the sum of the ratio and its inverse, so the ratio is
+        ``q + sqrt(q^2 - 1)``.
+        """
+        squares = (self.edge_lengths[self.face_edges] ** 2).sum(axis=1)
+        half_sum = np.full(self.n_faces, np.inf)
+        np.divide(squares, 4.0 * np.sqrt(3.0) * self.face_areas, out=half_sum, where=self.face_areas > 0.0)
+        half_sum = np.maximum(half_sum, 1.0)
+        return np.asarray(half_sum + np.sqrt(half_sum**2 - 1.0))
+
+    @cached_property
     def point_normals(self) -> PointVectors:
         """Area-weighted unit normals of the points (V, 3); zero at a point without faces."""
         return geometry.point_normals(self.points, self.faces)
@@ -146,8 +162,10 @@ class Surface:
 
 
 def _validated(points: npt.NDArray[Any], faces: npt.NDArray[Any]) -> tuple[Points, Faces]:
+    points, faces = np.asarray(points), np.asarray(faces)
+    if points.dtype.kind not in "biuf":
+        raise MeshError(f"points has dtype {points.dtype}; expected real numbers")
     points = np.array(points, dtype=np.float64, order="C")
-    faces = np.asarray(faces)
     if points.ndim != 2 or points.shape[1] != 3:
         raise MeshError(f"points has shape {points.shape}; expected (V, 3), one row x, y, z for each point")
     if faces.ndim != 2 or faces.shape[1] != 3:

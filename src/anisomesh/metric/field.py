@@ -8,7 +8,7 @@ from typing import Any, Protocol
 import numpy as np
 import numpy.typing as npt
 
-from anisomesh._arrays import EmbeddedPoints, Points, PointTensors
+from anisomesh._arrays import EmbeddedPoints, Points, PointTensors, real_array
 from anisomesh.errors import MetricError
 from anisomesh.mesh.surface import Surface
 from anisomesh.metric.tensors import validate_metric
@@ -51,7 +51,7 @@ class MetricSource(Protocol):
 
 
 def checked_field(field: Any, surface: Surface) -> MetricField:
-    """Return the result of a metric source for a surface after validation.
+    """Return the result of a metric source for a surface after validation, its arrays in float64.
 
     Raises
     ------
@@ -61,15 +61,18 @@ def checked_field(field: Any, surface: Surface) -> MetricField:
     """
     if not isinstance(field, MetricField):
         raise MetricError(f"the metric source returned {type(field).__name__}; expected a MetricField")
-    n = surface.n_points
-    for name, array, width in (("points", field.points, 3), ("extra", field.extra, None)):
-        if array is not None and not _fits(array, n, width):
-            shape = f"({n}, {width or 'k'})"
-            raise MetricError(f"{name} of the metric field has shape {np.shape(array)}; expected finite {shape}")
-    validate_metric(field.tensors, surface)
-    return field
+    tensors = validate_metric(field.tensors, surface)
+    points = extra = None
+    if field.points is not None:
+        points = _finite("points", field.points, (surface.n_points, 3))
+    if field.extra is not None:
+        width = np.shape(field.extra)[-1] if np.ndim(field.extra) == 2 else 0
+        extra = _finite("extra", field.extra, (surface.n_points, width))
+    return MetricField(tensors=tensors, points=points, extra=extra, noise=field.noise)
 
 
-def _fits(array: npt.NDArray[Any], n: int, width: int | None) -> bool:
-    array = np.asarray(array)
-    return array.ndim == 2 and len(array) == n and width in (None, array.shape[1]) and bool(np.isfinite(array).all())
+def _finite(name: str, values: Any, shape: tuple[int, ...]) -> npt.NDArray[np.float64]:
+    array = real_array(f"{name} of the metric field", values, shape, MetricError)
+    if not np.isfinite(array).all():
+        raise MetricError(f"{name} of the metric field has a number that is not finite")
+    return array

@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from anisomesh._arrays import PointScalars, PointTensors
+from anisomesh._arrays import PointScalars, PointTensors, real_array
 from anisomesh.errors import MetricError, OptionError
 from anisomesh.mesh.surface import Surface
 from anisomesh.metric.curvature import PrincipalCurvatures, principal_curvatures
@@ -19,6 +19,7 @@ DEFAULT_LIMITS = (1.0, 400.0)  # 1/length at bounding-box diagonal 1: stretch r 
 DEFAULT_SMOOTHING = 3  # one-ring averages; chosen on training meshes
 
 _MAX_ASYMMETRY = 1e-8  # largest difference of M and M^t, over the largest entry of M: single precision is accepted
+_LARGEST_ENTRY = 1e100  # so that products of three eigenvalues neither overflow nor, inverted, underflow
 _MIN_CONDITION = 1e-12  # smallest eigenvalue over largest entry: above the rounding of eigenvalues
 
 
@@ -166,7 +167,9 @@ def uniform_metric(surface: Surface) -> PointTensors:
     return np.tile(np.eye(3), (surface.n_points, 1, 1))
 
 
-def validate_metric(tensors: npt.NDArray[Any], surface: Surface) -> PointTensors:
+def validate_metric(
+    tensors: npt.ArrayLike, surface: Surface, *, numbers: npt.NDArray[np.integer] | None = None
+) -> PointTensors:
     """Return tensors (V, 3, 3) as exactly symmetric float64, after validation.
 
     Parameters
@@ -176,27 +179,38 @@ def validate_metric(tensors: npt.NDArray[Any], surface: Surface) -> PointTensors
         their ratios matter.
     surface
         The surface with the V points.
+    numbers
+        Numbers of the points (V,) in messages; by default their indices.
 
     Raises
     ------
     MetricError
-        If the shape is wrong, or a matrix is not finite, not symmetric (to 1e-8 of its largest entry) or not
-        positive definite (smallest eigenvalue above 1e-12 of the largest entry); names the first such point.
+        If the shape is wrong, or a matrix is not real and finite, not symmetric (to 1e-8 of its largest entry), not
+        positive definite or nearly singular (smallest eigenvalue up to 1e-12 of the largest entry), or its largest
+        entry is not between 1e-100 and 1e100; names the first such point.
     """
-    try:
-        matrices = np.asarray(tensors, dtype=np.float64)
-    except (TypeError, ValueError) as error:
-        raise MetricError(f"metric cannot be read as numbers ({error}); expected an array (V, 3, 3)") from error
-    if matrices.shape != (surface.n_points, 3, 3):
-        raise MetricError(f"metric has shape {matrices.shape}; expected ({surface.n_points}, 3, 3), one per point")
-    _reject(~np.isfinite(matrices).all(axis=(1, 2)), matrices, "has an entry that is not finite")
+    matrices = real_array("metric", tensors, (surface.n_points, 3, 3), MetricError)
+    names = np.arange(len(matrices)) if numbers is None else numbers
+
+    def reject(invalid: npt.ArrayLike, reason: str) -> None:
+        where = np.flatnonzero(invalid)
+        if len(where):
+            raise MetricError(
+                f"metric[{names[where[0]]}] = {matrices[where[0]].tolist()} {reason} ({len(where)} such points); "
+                "expected a symmetric positive definite 3x3 matrix at every point"
+            )
+
+    reject(~np.isfinite(matrices).all(axis=(1, 2)), "has an entry that is not finite")
     largest = np.abs(matrices).max(axis=(1, 2))
+    reject(largest > _LARGEST_ENTRY, f"has an entry above {_LARGEST_ENTRY:g}")
     skew = np.abs(matrices - matrices.transpose(0, 2, 1)).max(axis=(1, 2))
-    _reject(skew > _MAX_ASYMMETRY * largest, matrices, "is not symmetric")
+    reject(skew > _MAX_ASYMMETRY * largest, "is not symmetric")
     symmetric = 0.5 * (matrices + matrices.transpose(0, 2, 1))
     smallest = np.linalg.eigvalsh(symmetric)[:, 0]
-    _reject(smallest <= _MIN_CONDITION * largest, matrices, "is not positive definite")
-    return symmetric
+    reject(smallest <= 0.0, "is not positive definite")
+    reject(smallest <= _MIN_CONDITION * largest, f"is nearly singular (below {_MIN_CONDITION:g} in a direction)")
+    reject(largest < 1.0 / _LARGEST_ENTRY, f"has no entry above {1 / _LARGEST_ENTRY:g}")
+    return np.asarray(symmetric)
 
 
 def metric_root(tensors: PointTensors) -> PointTensors:
@@ -228,13 +242,3 @@ def _smoothed_logarithm(
         for _ in range(smoothing):
             mean, field = scalar_average @ mean, line_average @ field
     return mean, field, frames
-
-
-def _reject(invalid: npt.ArrayLike, tensors: npt.NDArray[np.float64], reason: str) -> None:
-    """Raise MetricError with the reason if any tensor is invalid (V,)."""
-    where = np.flatnonzero(invalid)
-    if len(where):
-        raise MetricError(
-            f"metric[{where[0]}] = {tensors[where[0]].tolist()} {reason} ({len(where)} such points); "
-            "expected a symmetric positive definite 3x3 matrix at every point"
-        )

@@ -7,7 +7,6 @@ from anisomesh.viz.gallery import Panel, gallery
 from anisomesh.viz.page import PICTURE_FORMATS
 from anisomesh.viz.renderer import require_renderer
 from anisomesh.viz.scene import side_by_side
-from anisomesh.viz.view import triangle_stretch
 
 __all__ = [
     "PICTURE_FORMATS",
@@ -21,6 +20,5 @@ __all__ = [
     "require_renderer",
     "side_by_side",
     "stretch_colouring",
-    "triangle_stretch",
     "voronoi_cells",
 ]

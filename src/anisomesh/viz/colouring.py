@@ -14,7 +14,6 @@ from anisomesh.mesh.closest_points import ClosestPoints
 from anisomesh.mesh.distance import squared_distances
 from anisomesh.mesh.geometry import unit_frame
 from anisomesh.mesh.surface import Surface
-from anisomesh.viz.view import triangle_stretch
 
 _UPPER_COLOUR_QUANTILE = 0.99  # of the values, for the last colour: a few outliers must not hide the rest; heuristic
 
@@ -76,7 +75,7 @@ class Colouring:
 
 
 def stretch_colouring(surface: Surface, *, high: float | None = None) -> Colouring:
-    """Colour triangles by their stretch, see :func:`~anisomesh.viz.view.triangle_stretch`.
+    """Colour triangles by their stretch, see :attr:`~anisomesh.mesh.surface.Surface.face_stretch`.
 
     Parameters
     ----------
@@ -85,7 +84,7 @@ def stretch_colouring(surface: Surface, *, high: float | None = None) -> Colouri
     high
         Stretch of the last colour, to compare surfaces; if None, the 99 % quantile.
     """
-    values = triangle_stretch(surface)
+    values = surface.face_stretch
     return Colouring(values=values, name=f"stretch of the triangles, mean {_mean(values):.2f}", low=1.0, high=high)
 
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 from scipy.spatial import cKDTree
 
-from anisomesh._arrays import FaceScalars, Points, Vector3
+from anisomesh._arrays import Points, Vector3
 from anisomesh.mesh.surface import Surface
 from anisomesh.viz.camera import View, camera_axes, framed
 
@@ -16,22 +16,6 @@ _MIN_FACING_COSINE = 0.6  # between normal and viewing direction of a face that 
 _NEIGHBOURHOOD_RADIUS = 1.5  # half heights of the close-up, around a candidate; heuristic
 _MAX_SCORED_STRETCH = 30.0  # a larger stretch counts as this one, so that degenerate triangles do not win; heuristic
 _OCCLUSION_TOLERANCE = 1e-6  # bounding-box diagonals; rounding of the depth of the face itself
-
-
-def triangle_stretch(surface: Surface) -> FaceScalars:
-    """Return the stretch of each triangle (F,): 1 for an equilateral one, infinite for one without area.
-
-    Notes
-    -----
-    The stretch is the ratio of the singular values of the linear map from an equilateral triangle. With side lengths
-    a, b, c and area A, ``q = (a^2 + b^2 + c^2) / (4 sqrt(3) A)`` is half the sum of the ratio and its inverse, so the
-    ratio is ``q + sqrt(q^2 - 1)``.
-    """
-    squares = (surface.edge_lengths[surface.face_edges] ** 2).sum(axis=1)
-    half_sum = np.full(surface.n_faces, np.inf)
-    np.divide(squares, 4 * np.sqrt(3) * surface.face_areas, out=half_sum, where=surface.face_areas > 0)
-    half_sum = np.maximum(half_sum, 1.0)
-    return np.asarray(half_sum + np.sqrt(half_sum**2 - 1))
 
 
 def whole_view(points: Points, aspect: float) -> View:
@@ -67,7 +51,7 @@ def closeup(surface: Surface, view: View, aspect: float) -> View:
     towards = view.axes[2]
     centroids = surface.points[surface.faces].mean(axis=1)
     facing = np.maximum(surface.face_normals @ towards, 0.0)
-    stretch = np.log(np.clip(triangle_stretch(surface), 1.0, _MAX_SCORED_STRETCH))
+    stretch = np.log(np.clip(surface.face_stretch, 1.0, _MAX_SCORED_STRETCH))
     front = np.flatnonzero(facing > _MIN_FACING_COSINE)
     if len(front) == 0:
         front = np.arange(surface.n_faces)

@@ -10,8 +10,8 @@ import numpy.typing as npt
 from scipy.sparse import coo_array
 from scipy.sparse.csgraph import connected_components
 
+from anisomesh.mesh.embedded_surface import EmbeddedSurface
 from anisomesh.voronoi.diagram import Diagram
-from anisomesh.voronoi.embedded_surface import EmbeddedSurface
 
 Ints = npt.NDArray[np.int32]
 Floats = npt.NDArray[np.float64]

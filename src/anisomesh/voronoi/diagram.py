@@ -10,7 +10,7 @@ import numpy as np
 import numpy.typing as npt
 
 from anisomesh._arrays import EmbeddedPoints, Faces, Sites
-from anisomesh.voronoi.embedded_surface import EmbeddedSurface
+from anisomesh.mesh.embedded_surface import EmbeddedSurface
 
 Ints = npt.NDArray[np.int32]
 
