@@ -38,8 +38,13 @@ Floats = Float64[np.ndarray, "n"]
 Indices = Int32[np.ndarray, "n"]
 
 
-def real_array(name: str, values: Any, shape: tuple[int, ...], error: type[Exception]) -> npt.NDArray[np.float64]:
-    """Return values as a new float64 array; raise an error of the given type unless they are real and fit the shape."""
+def real_array(
+    name: str, values: Any, shape: tuple[int | None, ...], error: type[Exception]
+) -> npt.NDArray[np.float64]:
+    """Return values as a new float64 array; raise an error of the given type unless they are real and fit the shape.
+
+    None in the shape stands for any size.
+    """
     try:
         array = np.asarray(values)
         if array.dtype.kind not in "biufO":
@@ -47,6 +52,7 @@ def real_array(name: str, values: Any, shape: tuple[int, ...], error: type[Excep
         array = array.astype(np.float64, order="C")
     except (TypeError, ValueError) as reason:
         raise error(f"{name} cannot be read as real numbers: {reason}") from reason
-    if array.shape != shape:
-        raise error(f"{name} has shape {array.shape}; expected {shape}")
+    if len(array.shape) != len(shape) or any(b not in (None, a) for a, b in zip(array.shape, shape, strict=True)):
+        expected = ", ".join("k" if size is None else str(size) for size in shape)
+        raise error(f"{name} has shape {array.shape}; expected ({expected}{',' * (len(shape) == 1)})")
     return array

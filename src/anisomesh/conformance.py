@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
+from anisomesh._values import whole_number
 from anisomesh.cvt.energy import Energy, evaluate_energy
 from anisomesh.embedding.embedder import Embedder, checked_embedding
 from anisomesh.errors import AnisomeshError
@@ -68,11 +69,12 @@ def check_embedder(embedder: Embedder, surface: Surface | None = None, source: M
     Raises
     ------
     OptionError
-        If the embedder is not callable, or its result is not a valid :class:`~anisomesh.embedding.base.Embedding` of
-        the surface.
+        If the result is not a valid :class:`~anisomesh.embedding.base.Embedding` of the surface.
     ConformanceError
-        If two calls give different results.
+        If the embedder is not callable, or two calls give different results.
     """
+    if not callable(embedder):
+        raise ConformanceError(f"an embedder is callable with a surface and a metric field, and {embedder!r} is not")
     RemeshOptions(embedding=embedder)
     for sample in [surface] if surface is not None else _samples():
         field = checked_field((source or Curvature())(sample), sample)
@@ -111,7 +113,11 @@ def check_energy_gradient(
     -----
     Masses only scale the steps of the optimisation: wrong ones make it slow, not wrong, and are not found here.
     """
+    if energy is None:
+        raise ConformanceError("the energy is None; expected an object with evaluate(voronoi, sites)")
     RemeshOptions(energy=energy)
+    for name, value, low in (("n_sites", n_sites, 2), ("directions", directions, 1), ("seed", seed, 0)):
+        whole_number(name, value, low)
     rng = np.random.default_rng(seed)
     voronoi = voronoi or RestrictedVoronoi(_with_normals(torus(n_major=24, n_minor=12)))
     embedded = voronoi.embedded

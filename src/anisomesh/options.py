@@ -5,9 +5,9 @@ from __future__ import annotations
 import math
 import os
 from dataclasses import dataclass
-from numbers import Integral, Real
 from typing import TYPE_CHECKING, Any, Literal, get_args
 
+from anisomesh._values import real_number, whole_number
 from anisomesh.errors import OptionError
 from anisomesh.metric.names import METRIC_NAMES, MetricName
 
@@ -20,6 +20,7 @@ if TYPE_CHECKING:  # the command line imports this module, and has to start at o
 
 EmbeddingName = Literal["auto", "direct", "neural", "hybrid"]
 DeviceName = Literal["cpu", "cuda"]
+MAX_THREADS = 1024
 _NUMBERS = ("sharpness", "feature_angle", "weld_tolerance")
 _OPTIONAL_NUMBERS = ("final_sharpness", "time_limit")
 _LEAST = {"seed": 0, "threads": 1, "lloyd_iterations": 0, "max_iterations": 0, "embedding_iterations": 1}
@@ -101,34 +102,33 @@ class RemeshOptions:
     time_limit: float | None = None
 
     def __post_init__(self) -> None:
-        self._check_types()
+        self._read_numbers()
         for name in ("sharpness", "final_sharpness"):
             value = getattr(self, name)
             if value is not None and not (math.isfinite(value) and value >= 1.0):
                 raise OptionError(f"{name} = {value}; expected a finite number of at least 1 (1 is the plain CVT)")
-        self._check_stages()
         if not 0.0 <= self.feature_angle <= 180.0:
             raise OptionError(f"feature_angle = {self.feature_angle}; expected 0 to 180 degrees")
         if not (self.weld_tolerance >= 0.0 and math.isfinite(self.weld_tolerance)):
             raise OptionError(f"weld_tolerance = {self.weld_tolerance}; expected a length of at least 0")
         if self.time_limit is not None and not self.time_limit > 0.0:
             raise OptionError(f"time_limit = {self.time_limit}; expected a positive number of seconds")
-        for name, low in _LEAST.items():
-            if getattr(self, name) < low:
-                raise OptionError(f"{name} = {getattr(self, name)}; expected at least {low}")
-
-    def _check_types(self) -> None:
-        """Check the types of numbers, switches and names."""
-        for name in (*_NUMBERS, *_OPTIONAL_NUMBERS):
-            value = getattr(self, name)
-            if not (value is None and name in _OPTIONAL_NUMBERS):
-                check_number(name, value)
-        for name in _LEAST:
-            check_whole_number(name, getattr(self, name))
+        if self.threads > MAX_THREADS:
+            raise OptionError(f"threads = {self.threads}; expected at most {MAX_THREADS}")
         if not isinstance(self.denoise, bool):
             raise OptionError(f"denoise = {self.denoise!r}; expected True or False")
         if not isinstance(self.weights, str | os.PathLike | None):
             raise OptionError(f"weights = {self.weights!r}; expected the name of a network or of a file")
+        self._check_stages()
+
+    def _read_numbers(self) -> None:
+        """Turn numbers of any type, such as NumPy's, into Python's."""
+        for name in (*_NUMBERS, *_OPTIONAL_NUMBERS):
+            value = getattr(self, name)
+            if not (value is None and name in _OPTIONAL_NUMBERS):
+                object.__setattr__(self, name, real_number(name, value))
+        for name, low in _LEAST.items():
+            object.__setattr__(self, name, whole_number(name, getattr(self, name), low))
 
     def _check_stages(self) -> None:
         """Check metric, embedding and energy, and that they fit each other."""
@@ -144,7 +144,7 @@ class RemeshOptions:
         for name in ("metric", "embedding", "energy"):
             if isinstance(given := getattr(self, name), type):
                 raise OptionError(f"{name} = {given.__name__} is a class; expected an object, {given.__name__}(...)")
-        if self.device not in DEVICES:
+        if not isinstance(self.device, str) or self.device not in DEVICES:
             raise OptionError(f"device = {self.device!r}; expected one of {', '.join(DEVICES)}")
         if self.energy is not None:
             if not callable(getattr(self.energy, "evaluate", None)):
@@ -158,15 +158,3 @@ class RemeshOptions:
         network = self.embedding in ("neural", "hybrid") or self.weights is not None
         if network and not (isinstance(self.metric, str) and self.metric == "curvature"):
             raise OptionError("a network (embedding, weights) predicts the curvature metric and no other")
-
-
-def check_number(name: str, value: object) -> None:
-    """Raise OptionError unless the value of an option is a real number."""
-    if isinstance(value, bool) or not isinstance(value, Real):
-        raise OptionError(f"{name} = {value!r}; expected a number")
-
-
-def check_whole_number(name: str, value: object) -> None:
-    """Raise OptionError unless the value of an option is an integer."""
-    if isinstance(value, bool) or not isinstance(value, Integral):
-        raise OptionError(f"{name} = {value!r}; expected a whole number")

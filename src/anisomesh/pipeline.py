@@ -12,6 +12,7 @@ import numpy as np
 import numpy.typing as npt
 
 from anisomesh._arrays import EdgeMask, PointScalars, PointTensors, real_array
+from anisomesh._values import real_number, whole_number
 from anisomesh.caveats import caveats
 from anisomesh.cvt.schedule import DualFeedback, optimise_sites
 from anisomesh.deadline import Deadline
@@ -32,7 +33,7 @@ from anisomesh.mesh.validity import check_validity
 from anisomesh.mesh.working_surface import working_surface
 from anisomesh.metric.field import checked_field
 from anisomesh.metric.tensors import validate_metric
-from anisomesh.options import RemeshOptions, check_number, check_whole_number
+from anisomesh.options import RemeshOptions
 from anisomesh.progress import OnStep, StepInfo, ignore_steps
 from anisomesh.repair.prepare import Prepared, prepare
 from anisomesh.resolve import cvt_options, embedder, embedding_name, follows_creases, metric_source
@@ -41,6 +42,8 @@ from anisomesh.search import MIN_VERTICES, smallest_within
 from anisomesh.voronoi.restricted import RestrictedVoronoi
 
 WEAK_ANGLE = 20.0  # degrees; edges this sharp stay in the working surface, weak features among them; heuristic
+_LARGEST_DENSITY = 1e30  # and inverse of the smallest, so that energies are far from overflow
+MAX_RATIO = 1e12  # vertices per vertex of the input; more is a mistake
 OPTIMISATION_SHARE = 0.6  # of the time limit, for everything up to the end of the optimisation
 
 
@@ -98,9 +101,11 @@ def remesh(
     """
     options = _with_overrides(RemeshOptions() if options is None else options, overrides)
     deadline = Deadline(options.time_limit)
+    if on_step is not None and not callable(on_step):
+        raise OptionError(f"on_step = {on_step!r}; expected a function of a StepInfo")
     run = _Run(on_step or ignore_steps, deadline)
     surface = as_surface(mesh, faces)
-    _check_count(n_vertices, ratio, max_error)
+    n_vertices, ratio, max_error = _read_target(n_vertices, ratio, max_error)
     with run.stage("prepare"):
         source = _prepared_input(surface, options)
     prepared = source.prepared.surface
@@ -145,10 +150,12 @@ def _prepared_input(surface: Surface, options: RemeshOptions) -> _Input:
         tensors = validate_metric(given, prepared.surface, numbers=prepared.point_source)
     if options.density is not None:
         density = _at_prepared("density", options.density, (surface.n_points,), prepared, OptionError)
-        invalid = np.flatnonzero(~(np.isfinite(density) & (density > 0.0)))
+        invalid = np.flatnonzero(~((density > 1.0 / _LARGEST_DENSITY) & (density < _LARGEST_DENSITY)))
         if len(invalid):
             value, where = density[invalid[0]], prepared.point_source[invalid[0]]
-            raise OptionError(f"density[{where}] = {value:g}; expected a positive weight for each point of the input")
+            raise OptionError(
+                f"density[{where}] = {value:g}; expected a positive weight for each point, below {_LARGEST_DENSITY:g}"
+            )
     tagged = np.zeros(len(prepared.surface.edges), dtype=bool)
     if options.features is not None:
         tagged = tagged_edges(surface, options.features, prepared.surface, options.weld_tolerance)
@@ -268,20 +275,21 @@ def _with_overrides(options: RemeshOptions, overrides: dict[str, Any]) -> Remesh
     return replace(options, **overrides)
 
 
-def _check_count(n_vertices: int | None, ratio: float | None, max_error: float | None) -> None:
-    if (n_vertices, ratio, max_error).count(None) != 2:
+def _read_target(n_vertices: object, ratio: object, max_error: object) -> tuple[int | None, float | None, float | None]:
+    """Return the one of the three that is given, as a number in range, and None for the others."""
+    if sum(value is not None for value in (n_vertices, ratio, max_error)) != 1:
         raise OptionError("give one of n_vertices, ratio and max_error")
     if n_vertices is not None:
-        check_whole_number("n_vertices", n_vertices)
-    for name, value in (("ratio", ratio), ("max_error", max_error)):
-        if value is not None:
-            check_number(name, value)
-    if max_error is not None and not (np.isfinite(max_error) and max_error > 0.0):
-        raise OptionError(f"max_error = {max_error}; expected a positive length in model units")
-    if n_vertices is not None and n_vertices < MIN_VERTICES:
-        raise OptionError(f"n_vertices = {n_vertices}; expected a whole number of at least {MIN_VERTICES}")
-    if ratio is not None and not (np.isfinite(ratio) and ratio > 0.0):
-        raise OptionError(f"ratio = {ratio}; expected a positive number, such as 0.2 for a fifth of the vertices")
+        return whole_number("n_vertices", n_vertices, MIN_VERTICES), None, None
+    if max_error is not None:
+        length = real_number("max_error", max_error)
+        if not (np.isfinite(length) and length > 0.0):
+            raise OptionError(f"max_error = {length}; expected a positive length in model units")
+        return None, None, length
+    share = real_number("ratio", ratio)
+    if not 0.0 < share <= MAX_RATIO:
+        raise OptionError(f"ratio = {share}; expected a positive number, such as 0.2 for a fifth of the vertices")
+    return None, share, None
 
 
 def _at_prepared(

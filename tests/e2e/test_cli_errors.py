@@ -1,5 +1,6 @@
 """Wrong usage is exit code 2, refused input exit code 1; one line on stderr, nothing on stdout, no file left."""
 
+import shlex
 import subprocess
 import sys
 from importlib.metadata import version
@@ -48,6 +49,8 @@ def refuse(run_cli, tmp_path):
         (["-n", "100", "--report", "out.ply"], "same file name"),
         (["-n", "100", "--report", "missing/report.json"], "there is no folder missing"),
         (["-n", "100", "--shapness", "3"], "--shapness"),
+        (["-n", "100", "--threads", "99999999999999999999"], "--threads"),
+        (["-n", "100", "--report", "/dev/null"], "not a plain file"),
     ],
 )
 def test_wrong_usage(refuse, torus_obj, tmp_path, words, expected):
@@ -82,6 +85,33 @@ def test_no_output_overwrites_an_input(run_cli, torus_obj, tmp_path, option):
     assert mesh.read_bytes() == torus_obj.read_bytes()
     assert pairs.read_text() == "0 1\n"
     assert not (tmp_path / "out.ply").exists()
+
+
+def test_no_figure_overwrites_its_input_through_a_link(run_cli, torus_obj, tmp_path):
+    (tmp_path / "mesh.obj").write_bytes(torus_obj.read_bytes())
+    (tmp_path / "link.png").symlink_to(tmp_path / "mesh.obj")
+    for words in (["result", "mesh.obj", "mesh.obj"], ["gallery", torus_obj, "mesh.obj"], ["strip", "mesh.obj"]):
+        done = run_cli("figure", *words, "-o", "link.png", cwd=tmp_path)
+        assert done.returncode == 2
+        assert "is an input and would be overwritten" in done.stderr
+    assert (tmp_path / "mesh.obj").read_bytes() == torus_obj.read_bytes()
+
+
+def test_a_ratio_that_no_machine_can_do_is_refused(refuse, torus_obj):
+    assert "ratio = 1e+308" in refuse(1, "remesh", torus_obj, "-o", "out.ply", "--ratio", "1e308")
+
+
+def test_an_output_that_is_a_loop_of_links_is_refused(refuse, torus_obj, tmp_path):
+    (tmp_path / "loop.ply").symlink_to(tmp_path / "loop.ply")
+    assert "loop.ply cannot be written" in refuse(2, "remesh", torus_obj, "-o", "loop.ply", "-n", 100)
+
+
+@pytest.mark.skipif(sys.platform == "win32", reason="needs a POSIX shell")
+@pytest.mark.slow
+def test_a_closed_standard_output_is_no_error(torus_obj):
+    command = shlex.join([*CLI, "info", str(torus_obj)])
+    done = subprocess.run(["sh", "-c", f"{command} >&-"], capture_output=True, text=True, timeout=60, check=False)
+    assert "Traceback" not in done.stderr
 
 
 @pytest.mark.skipif(not Path("/proc/self").exists(), reason="there is no folder in which nobody can write")

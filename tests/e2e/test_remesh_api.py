@@ -1,5 +1,7 @@
 """The Python interface: what it accepts, what it returns, what it refuses."""
 
+from fractions import Fraction
+
 import numpy as np
 import pytest
 
@@ -177,6 +179,17 @@ def test_an_exception_in_the_callback_ends_the_work(ring):
         ({"n_vertices": 100, "weights": 7}, "name of a network"),
         ({"n_vertices": 100, "weld_tolerance": -1.0}, "at least 0"),
         ({"n_vertices": 100, "options": {}}, "expected RemeshOptions"),
+        ({"n_vertices": 10**400}, "at most"),
+        ({"n_vertices": 100, "sharpness": 10**400}, "smaller number"),
+        ({"n_vertices": 100, "threads": 10**6}, "at most 1024"),
+        ({"n_vertices": 100, "device": np.array(["cpu", "cpu"])}, "device"),
+        ({"n_vertices": np.array([5, 6])}, "whole number"),
+        ({"ratio": 1e308}, "ratio = 1e"),
+        ({"n_vertices": 100, "on_step": 3}, "expected a function"),
+        ({"n_vertices": 100, "features": [[0, 1], [2]]}, "rows of different lengths"),
+        ({"n_vertices": 100, "features": [["a", "b"]]}, "expected whole numbers"),
+        ({"n_vertices": 100, "features": [[0, float("nan")]]}, "whole numbers"),
+        ({"n_vertices": 100, "features": [[0, 1j]]}, "expected whole numbers"),
         ({"n_vertices": 100, "metric": anisomesh.Curvature}, "is a class"),
         ({"ratio": 0.0}, "positive number"),
         ({"ratio": float("nan")}, "positive number"),
@@ -214,6 +227,13 @@ def test_a_wrong_tensor_is_named_by_the_point_of_the_input():
         anisomesh.remesh(surface, n_vertices=40, density=np.where(np.arange(surface.n_points) == 10, 0.0, 1.0))
 
 
+def test_numbers_of_any_type_and_no_features_are_accepted(ring):
+    options = {"sharpness": Fraction(7), "seed": np.int64(0), "feature_angle": np.float32(40.0), "features": []}
+    result = anisomesh.remesh(ring, n_vertices=np.int32(60), embedding="direct", **options, **FEW)
+    plain = anisomesh.remesh(ring, n_vertices=60, embedding="direct", **FEW)
+    np.testing.assert_array_equal(result.surface.points, plain.surface.points)
+
+
 def test_the_report_has_the_stretch_of_the_triangles(result):
     report = result.report()
     assert report["stretch"]["mean"] == pytest.approx(result.surface.face_stretch.mean())
@@ -222,5 +242,9 @@ def test_the_report_has_the_stretch_of_the_triangles(result):
 
 
 def test_values_that_are_not_meshes_are_refused():
+    with pytest.raises(MeshError, match="rows of different lengths"):
+        anisomesh.remesh([[0.0, 0, 0], [1, 0, 0], [0, 1, 0]], [[0, 1, 2], [0, 1]], n_vertices=100)
+    with pytest.raises(MeshError, match="leave out the second argument"):
+        anisomesh.remesh(torus(1.0, 0.3, 8, 6), [[0, 1, 2]], n_vertices=100)
     with pytest.raises(MeshError, match="cannot read a mesh from str"):
         anisomesh.remesh("bunny.obj", n_vertices=100)

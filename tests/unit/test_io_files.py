@@ -10,7 +10,7 @@ import meshio
 import numpy as np
 import pytest
 
-from anisomesh.errors import MeshFileError
+from anisomesh.errors import MeshError, MeshFileError
 from anisomesh.io.atomic import atomic_path
 from anisomesh.io.gmsh_counts import check_counts
 from anisomesh.io.meshes import MESH_FORMATS, load, save
@@ -18,6 +18,7 @@ from anisomesh.mesh.surface import Surface
 from anisomesh.shapes import analytic as shapes
 
 BOX = shapes.box(n=2)
+TETRAHEDRON = Surface(np.vstack([np.zeros(3), np.eye(3)]), np.array([[0, 2, 1], [0, 1, 3], [1, 2, 3], [0, 3, 2]]))
 PLY = "ply\nformat ascii 1.0\nelement vertex 3\nproperty float x\nproperty float y\nproperty float z\n"
 PLY_FACES = "element face 1\nproperty list uchar int vertex_indices\nend_header\n"
 THREE = "0 0 0\n1 0 0\n0 1 0\n"
@@ -226,7 +227,7 @@ def test_point_data_reaches_vtu_and_ply(tmp_path, caplog):
         save(BOX, tmp_path / "b.ply", point_data={"x": data["height"]})
     save(BOX, tmp_path / "a.obj", point_data=data)
     assert "'height', which OBJ cannot store" in caplog.text
-    with pytest.raises(MeshFileError, match="3 rows; expected one per point, 26"):
+    with pytest.raises(MeshFileError, match=r"has shape \(3,\); expected \(26,\)"):
         save(BOX, tmp_path / "b.ply", point_data={"q": np.zeros(3)})
     assert not (tmp_path / "b.ply").exists()
 
@@ -352,3 +353,49 @@ def test_blocks_of_gmsh_4_are_checked_before_the_library_makes_room(tmp_path, bi
         changed = data[:start] + b"\n".join([*lines[:2], b"1000000000000", *lines[3:]])
     with pytest.raises(ValueError, match="the number of a node is 1000000000000"):
         check_counts(changed)
+
+
+@pytest.mark.parametrize(
+    ("values", "message"),
+    [
+        ([[1], [1, 2], [1], [1]], "cannot be read as an array"),
+        (3, "has shape"),
+        (None, "has shape"),
+        (np.ones((4, 3, 3)), "has shape"),
+        (np.ones((4, 0)), "has shape"),
+        (np.ones(4) + 1j, "expected integers or real numbers"),
+        (np.array(["a"] * 4), "expected integers or real numbers"),
+        (np.array(["2020-01-01"] * 4, dtype="datetime64[D]"), "expected integers or real numbers"),
+    ],
+)
+@pytest.mark.parametrize("suffix", [".ply", ".vtu"])
+def test_point_data_that_no_format_can_store_is_refused_and_leaves_no_file(tmp_path, suffix, values, message):
+    with pytest.raises(MeshFileError, match=message):
+        save(TETRAHEDRON, tmp_path / f"a{suffix}", point_data={"a": values})
+    assert list(tmp_path.iterdir()) == []
+
+
+@pytest.mark.parametrize(
+    "dtype", [bool, np.float16, np.float32, np.float64, np.longdouble, np.int8, np.int64, np.uint16]
+)
+@pytest.mark.parametrize("suffix", [".ply", ".vtu"])
+def test_point_data_of_every_real_type_is_written_and_the_mesh_read_back(tmp_path, suffix, dtype):
+    mesh = BOX
+    save(mesh, tmp_path / f"a{suffix}", point_data={"a": np.ones(mesh.n_points, dtype=dtype)})
+    np.testing.assert_array_equal(load(tmp_path / f"a{suffix}").points, mesh.points)
+
+
+def test_what_is_not_a_mesh_or_a_file_name_is_refused(tmp_path):
+    with pytest.raises(MeshError, match="cannot read a mesh from NoneType"):
+        save(None, tmp_path / "a.ply")
+    for path in (None, 3, b"x.obj"):
+        with pytest.raises(MeshFileError, match="not a file name"):
+            load(path)
+        with pytest.raises(MeshFileError, match="not a file name"):
+            save(BOX, path)
+    for call in (load, lambda path: save(BOX, path)):
+        with pytest.raises(MeshFileError, match=r"cannot be|no such file"):
+            call(tmp_path / ("a" * 300 + ".obj"))
+    (tmp_path / "loop.ply").symlink_to(tmp_path / "loop.ply")
+    with pytest.raises(MeshFileError, match="cannot be written"):
+        save(BOX, tmp_path / "loop.ply")

@@ -113,7 +113,11 @@ def read_rows(path: Path) -> list[RunRow]:
         If a line is not a row.
     """
     rows = []
-    for number, line in enumerate(path.read_text(encoding="utf-8").splitlines() if path.exists() else [], 1):
+    try:
+        lines = path.read_text(encoding="utf-8").splitlines() if path.exists() else []
+    except UnicodeDecodeError as error:
+        raise AnisomeshError(f"{path} is not a text file of benchmark rows; move it away") from error
+    for number, line in enumerate(lines, 1):
         try:
             row = json.loads(line)
             row.setdefault("input", CLEAN)

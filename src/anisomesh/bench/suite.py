@@ -144,10 +144,12 @@ def _method(suite: str, entry: dict[str, Any]) -> SuiteMethod:
         raise OptionError(
             f"{suite}: method {method!r} is unknown{hint(method, list(METHODS))}; expected one of {', '.join(METHODS)}"
         )
-    options, training = dict(entry.get("options", {})), entry.get("training")
+    options, training = entry.get("options", {}), entry.get("training")
+    if not isinstance(options, dict):
+        raise OptionError(f"{suite}: options = {options!r}; expected a table")
     if training is not None and not isinstance(training, dict):
         raise OptionError(f"{suite}: training = {training!r}; expected a table")
-    return SuiteMethod(name=str(entry.get("name", method)), method=method, options=options, training=training)
+    return SuiteMethod(name=str(entry.get("name", method)), method=method, options=dict(options), training=training)
 
 
 def _list(suite: str, table: dict[str, Any], key: str, kind: Any) -> list[Any]:

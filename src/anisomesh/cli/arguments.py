@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING, Annotated, Any, TypeVar
 import typer
 
 from anisomesh.metric.names import MetricName
-from anisomesh.options import DeviceName, EmbeddingName, RemeshOptions
+from anisomesh.options import MAX_THREADS, DeviceName, EmbeddingName, RemeshOptions
 
 if TYPE_CHECKING:
     from anisomesh.mesh.surface import Surface
@@ -89,7 +89,7 @@ REMESH_OPTIONS: dict[str, Any] = {
         int,
         _option(min=0, help="Seed of the initial sites; the same seed and input give the same result."),
     ],
-    "threads": Annotated[int, _option(min=1, help="Worker threads; they do not change the result.")],
+    "threads": Annotated[int, _option(min=1, max=MAX_THREADS, help="Worker threads; they do not change the result.")],
     "time_limit": Annotated[
         float | None,
         _option(

@@ -11,6 +11,7 @@ from anisomesh.cli.job import Outputs, run_remesh
 from anisomesh.cli.progress import progress
 from anisomesh.cli.report import summary
 from anisomesh.errors import AnisomeshError
+from anisomesh.options import MAX_THREADS
 
 DEMO_SAMPLE = "knot"  # strongly stretched triangles, no flat part
 DEMO_VERTICES = 800
@@ -23,7 +24,7 @@ def command(
     n_vertices: Annotated[
         int, typer.Option("--vertices", "-n", min=4, help="Number of vertices of the result.")
     ] = DEMO_VERTICES,
-    threads: Annotated[int, typer.Option(min=1, help="Worker threads.")] = 2,
+    threads: Annotated[int, typer.Option(min=1, max=MAX_THREADS, help="Worker threads.")] = 2,
     quiet: Annotated[bool, typer.Option("--quiet", "-q", help="No progress and no summary.")] = False,
 ) -> None:
     """Remesh a knotted tube: writes the input, the result, a report and a picture coloured by stretch."""

@@ -15,10 +15,13 @@ if TYPE_CHECKING:
     from anisomesh.evaluation.report import Evaluation
 
 
+MAX_SAMPLES = 50_000_000  # takes some GB
+
+
 def command(
     reference: Annotated[Path, typer.Argument(metavar="REFERENCE", help="The mesh that was remeshed.")],
     result: Annotated[Path, typer.Argument(metavar="RESULT", help="The remesh, in the same coordinates.")],
-    samples: Annotated[int, typer.Option(min=1, help="Random points on each surface.")] = 100_000,
+    samples: Annotated[int, typer.Option(min=1, max=MAX_SAMPLES, help="Random points on each surface.")] = 100_000,
     crease_angle: Annotated[
         float, typer.Option(min=0.0, max=180.0, help="Edges that bend by more than this many degrees are creases.")
     ] = 30.0,

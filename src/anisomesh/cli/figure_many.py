@@ -47,7 +47,7 @@ def gallery(
     from anisomesh.viz import gallery as draw
 
     view = picture_options(direction, up, scale)
-    check_figure_path(out)
+    check_figure_path(out, *sources)
     with progress(quiet) as display:
         surfaces = [read(source)[0] for source in sources]
         panels = [
@@ -94,7 +94,7 @@ def strip(
 
     wanted = _parsed(ratios)
     view = picture_options(direction, up, scale)
-    check_figure_path(out)
+    check_figure_path(out, source)
     panels, rows = [], []
     with progress(quiet) as display:
         surface, seconds = read(source)

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Annotated, Literal, get_args
 
 import typer
 
-from anisomesh.cli.job import check_output_path, check_picture_path
+from anisomesh.cli.job import check_output_path, check_picture_path, refuse_to_overwrite
 from anisomesh.cli.report import counted, table
 
 if TYPE_CHECKING:
@@ -26,17 +26,18 @@ Direction = Annotated[
 Up = Annotated[AxisName | None, typer.Option("--up", help="Axis that points up; by default z, or y in a view along z.")]
 
 
-def check_figure_path(out: Path) -> None:
-    """Check before any work that a figure can be drawn on this machine and written to a file.
+def check_figure_path(out: Path, *inputs: Path | None) -> None:
+    """Check before any work that a figure can be drawn on this machine and written to a file that is no input.
 
     Raises
     ------
     typer.BadParameter
-        If the folder does not exist, the name is that of a folder, or the suffix is wrong.
+        If the folder does not exist, the name is a folder's or an input's, or the suffix is wrong.
     AnisomeshError
         If nothing can be drawn on this machine.
     """
     check_output_path(out)
+    refuse_to_overwrite(out, *inputs)
     check_picture_path(out, "-o")
 
 

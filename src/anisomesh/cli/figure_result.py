@@ -59,7 +59,7 @@ def command(
     """
     _check_choice(remeshed, cells, n_vertices, ratio)
     view = picture_options(direction, up, scale)
-    check_figure_path(out)
+    check_figure_path(out, source, remeshed)
     with progress(quiet) as display:
         if remeshed is None:
             options |= {"n_vertices": n_vertices, "ratio": ratio}

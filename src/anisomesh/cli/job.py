@@ -51,10 +51,8 @@ class Outputs:
             check_output_path(path)
         if len({path.resolve() for path in self.paths}) < len(self.paths):
             raise typer.BadParameter("two outputs have the same file name; give each its own")
-        read_only = inputs[1:]
         for path in self.paths:
-            if any(_same_file(path, other) for other in (read_only if path is self.mesh else inputs) if other):
-                raise typer.BadParameter(f"{path} is an input and would be overwritten; give another name")
+            refuse_to_overwrite(path, *(inputs[1:] if path is self.mesh else inputs))
         from anisomesh.io.meshes import MESH_FORMATS
 
         if self.mesh.suffix.lower() not in MESH_FORMATS:
@@ -91,19 +89,26 @@ def check_output_path(path: Path) -> None:
     typer.BadParameter
         If its folder does not exist or cannot be written, or the path is a folder.
     """
-    if path.is_dir():
-        raise typer.BadParameter(f"{path} is a folder; give the name of a file in it")
-    if not path.parent.is_dir():
-        raise typer.BadParameter(f"{path}: there is no folder {path.parent}; create it first")
     try:
-        with tempfile.NamedTemporaryFile(dir=path.parent, prefix="."):
+        target = path.resolve()
+        if target.is_dir():
+            raise typer.BadParameter(f"{path} is a folder; give the name of a file in it")
+        if target.exists() and not target.is_file():
+            raise typer.BadParameter(f"{path} is not a plain file; give another name")
+        if not target.parent.is_dir():
+            folder = path.parent if target.parent == path.parent.resolve() else target.parent
+            raise typer.BadParameter(f"{path}: there is no folder {folder}; create it first")
+        with tempfile.NamedTemporaryFile(dir=target.parent, prefix="."):
             pass
-    except OSError as error:
-        raise typer.BadParameter(f"{path} cannot be written: {error.strerror}") from None
+    except (OSError, RuntimeError, UnicodeError) as error:  # RuntimeError: a loop of links, before Python 3.13
+        reason = error.strerror if isinstance(error, OSError) else str(error)
+        raise typer.BadParameter(f"{path} cannot be written: {reason}") from None
 
 
-def _same_file(path: Path, other: Path) -> bool:
-    return path.exists() and other.exists() and path.samefile(other)
+def refuse_to_overwrite(path: Path, *inputs: Path | None) -> None:
+    """Raise typer.BadParameter if a file to be written is one of the inputs, under whatever name."""
+    if any(other and path.exists() and other.exists() and path.samefile(other) for other in inputs):
+        raise typer.BadParameter(f"{path} is an input and would be overwritten; give another name")
 
 
 def check_picture_path(path: Path, option: str) -> None:

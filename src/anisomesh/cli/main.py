@@ -69,7 +69,8 @@ def main(arguments: list[str]) -> int:
     """
     try:
         status = app(args=arguments, prog_name="anisomesh", standalone_mode=False) or 0
-        sys.stdout.flush()
+        if sys.stdout is not None:  # it is None if the shell has closed it
+            sys.stdout.flush()
     except _UsageError as error:
         return _fail(_usage_message(error), 2)
     except AnisomeshError as error:
@@ -80,7 +81,7 @@ def main(arguments: list[str]) -> int:
     except OSError as error:
         return _fail(f"{error.filename or 'output'}: {error.strerror or error}", 1)
     except MemoryError:
-        return _fail("out of memory; ask for fewer vertices or use a machine with more memory", 1)
+        return _fail("out of memory; ask for fewer vertices or samples, or use a machine with more memory", 1)
     except (KeyboardInterrupt, typer.Abort):
         status = 130
     if status == 130:

@@ -9,8 +9,11 @@ import numpy as np
 import numpy.typing as npt
 
 from anisomesh._arrays import Sites, real_array
+from anisomesh._values import real_number
 from anisomesh.errors import OptionError
 from anisomesh.voronoi.restricted import EnergyValue, RestrictedVoronoi
+
+_LARGEST_NUMBER = 1e100  # so that products of two numbers do not overflow
 
 
 class Energy(Protocol):
@@ -45,8 +48,8 @@ def evaluate_energy(energy: Energy, voronoi: RestrictedVoronoi, sites: Sites) ->
 def _finite(name: str, values: Any, shape: tuple[int, ...]) -> npt.NDArray[np.float64]:
     """Return a field of an energy as a new array after validation."""
     array = real_array(f"{name} of the energy", values, shape, OptionError)
-    if not np.isfinite(array).all():
-        raise OptionError(f"{name} of the energy has a number that is not finite")
+    if not (np.abs(array) < _LARGEST_NUMBER).all():
+        raise OptionError(f"{name} of the energy has a number that is not finite or above {_LARGEST_NUMBER:g}")
     return array
 
 
@@ -74,7 +77,7 @@ class NormalMetric:
     sharpness: float = 7.0
 
     def __post_init__(self) -> None:
-        if not (np.isfinite(self.sharpness) and self.sharpness >= 1.0):
+        if not (np.isfinite(real_number("sharpness", self.sharpness)) and self.sharpness >= 1.0):
             raise OptionError(f"sharpness = {self.sharpness}; expected a finite number of at least 1 (the plain CVT)")
 
     def evaluate(self, voronoi: RestrictedVoronoi, sites: Sites, /) -> EnergyValue:

@@ -7,6 +7,7 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
+from numba.core.errors import NumbaError
 
 from anisomesh._arrays import Sites
 from anisomesh._kernels.polygon_energy import integrate_polygons, is_compiled
@@ -66,17 +67,21 @@ class PolygonEnergy:
         n_polygons, dimension = len(diagram.site), embedded.dimension
         value, site_gradient = np.zeros(n_polygons), np.zeros((n_polygons, dimension))
         vertex_gradient = np.zeros((len(diagram.label), dimension))
-        integrate_polygons(
-            self.function,
-            diagram.positions,
-            diagram.offset,
-            diagram.site,
-            diagram.sites,
-            embedded.facets.normal[diagram.facet],
-            value,
-            vertex_gradient,
-            site_gradient,
-        )
+        try:
+            integrate_polygons(
+                self.function,
+                diagram.positions,
+                diagram.offset,
+                diagram.site,
+                diagram.sites,
+                embedded.facets.normal[diagram.facet],
+                value,
+                vertex_gradient,
+                site_gradient,
+            )
+        except NumbaError as error:
+            reason = " ".join(str(error).split())[:200]
+            raise OptionError(f"the polygon function cannot be compiled for its five arguments: {reason}") from error
         if embedded.density is not None:
             weight = embedded.density[embedded.faces].mean(axis=1)[diagram.facet]
             value, site_gradient = weight * value, weight[:, None] * site_gradient

@@ -4,9 +4,10 @@ from __future__ import annotations
 
 import numpy as np
 
-from anisomesh._arrays import EmbeddedPoints, PointTensors
+from anisomesh._arrays import EmbeddedPoints, PointTensors, real_array
 from anisomesh.embedding.base import Embedding, EmbeddingStatus, stretch_statistics
 from anisomesh.embedding.gradient import face_gradient, face_tensors
+from anisomesh.errors import MetricError, OptionError
 from anisomesh.mesh.geometry import sums_at_points
 from anisomesh.mesh.surface import Surface
 
@@ -22,7 +23,16 @@ def precomputed_embedding(surface: Surface, extra: EmbeddedPoints, tensors: Poin
         Extra coordinates (V, k), in units of the surface.
     tensors
         Target metric (V, 3, 3), for the statistics of the stretch only.
+
+    Raises
+    ------
+    OptionError
+        If the extra coordinates are not real numbers (V, k).
+    MetricError
+        If the tensors are not real numbers (V, 3, 3).
     """
+    extra = real_array("extra", extra, (surface.n_points, None), OptionError)
+    tensors = real_array("tensors", tensors, (surface.n_points, 3, 3), MetricError)
     points, gradient = np.concatenate([surface.points, extra], axis=1), face_gradient(surface)
     metric = face_tensors(surface, tensors, gradient.frames)
     return Embedding(

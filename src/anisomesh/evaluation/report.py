@@ -7,6 +7,8 @@ from typing import Any
 
 import numpy as np
 
+from anisomesh._values import real_number, whole_number
+from anisomesh.errors import OptionError
 from anisomesh.evaluation.boundary import BoundaryDistance, boundary_distance
 from anisomesh.evaluation.preservation import FeaturePreservation, feature_preservation
 from anisomesh.evaluation.sampled import CREASE_ANGLE, DEFAULT_SAMPLES, SampledMeasures, sampled_measures
@@ -102,12 +104,15 @@ def evaluate(
     MeshError
         If one of the two is not a mesh, or the repaired reference is empty.
     OptionError
-        If ``samples`` is below 1.
+        If ``samples``, ``crease_angle`` or ``seed`` is out of range.
 
     References
     ----------
     NASM, section 4.1.
     """
+    samples, seed = whole_number("samples", samples, 1), whole_number("seed", seed, 0)
+    if not 0.0 <= real_number("crease_angle", crease_angle) <= 180.0:
+        raise OptionError(f"crease_angle = {crease_angle}; expected 0 to 180 degrees")
     repaired = prepare(as_surface(reference)).surface
     frame = unit_frame(repaired.points)
     a = repaired.with_points(frame.to_unit(repaired.points))

@@ -81,13 +81,19 @@ def tagged_edges(input_mesh: Surface, pairs: npt.ArrayLike, prepared: Surface, t
 
 def _checked_pairs(input_mesh: Surface, pairs: npt.ArrayLike) -> npt.NDArray[np.int64]:
     """Return the pairs as integers (n, 2) after validation."""
-    values: npt.NDArray[Any] = np.asarray(pairs)
-    if values.ndim != 2 or values.shape[1] != 2 or not np.issubdtype(values.dtype, np.number):
-        raise OptionError(f"features has shape {values.shape}; expected (n, 2), two points of the mesh for each edge")
-    if len(values) == 0:
+    try:
+        values: npt.NDArray[Any] = np.asarray(pairs)
+    except ValueError as error:
+        raise OptionError(f"features has rows of different lengths ({error}); expected (n, 2)") from error
+    if values.size == 0:
         return np.zeros((0, 2), dtype=np.int64)
-    ends = values.astype(np.int64)
-    if (ends != values).any() or ends.min() < 0 or ends.max() >= input_mesh.n_points:
+    if values.ndim != 2 or values.shape[1] != 2:
+        raise OptionError(f"features has shape {values.shape}; expected (n, 2), two points of the mesh for each edge")
+    if values.dtype.kind not in "iuf":
+        raise OptionError(f"features has type {values.dtype}; expected whole numbers, two points for each edge")
+    whole = np.isfinite(values) & (values == np.floor(values)) & (values >= 0) & (values < input_mesh.n_points)
+    ends = np.where(whole, values, -1).astype(np.int64)
+    if not whole.all():
         raise OptionError(
             f"features has points from {values.min()} to {values.max()}; expected whole numbers from 0 to "
             f"{input_mesh.n_points - 1}"

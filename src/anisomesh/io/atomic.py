@@ -31,10 +31,14 @@ def atomic_path(path: str | os.PathLike[str]) -> Iterator[Path]:
     The temporary path has the suffix of ``path``, since libraries choose the format by it. If the block raises,
     KeyboardInterrupt included, the temporary file is removed and ``path`` is unchanged.
     """
-    target = Path(path).resolve()
+    try:
+        target = Path(path).resolve()
+        is_other = target.exists() and not target.is_file()
+    except (OSError, RuntimeError) as error:  # RuntimeError before Python 3.13
+        raise MeshFileError(f"{path}: cannot be written: {error}") from error
     if not target.parent.is_dir():
         raise MeshFileError(f"{path}: cannot be written: there is no folder {target.parent}; create it first")
-    if target.exists() and not target.is_file():
+    if is_other:
         raise MeshFileError(f"{path}: cannot be written: it exists and is not a plain file; choose another name")
     temporary = target.with_name(f".{target.stem[:80]}.{secrets.token_hex(4)}{target.suffix}")
     try:

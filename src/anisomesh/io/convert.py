@@ -26,10 +26,12 @@ def as_surface(mesh: Any, faces: npt.NDArray[Any] | None = None) -> Surface:
     MeshError
         If the object is none of these, has faces other than triangles, or its arrays are not a mesh.
     """
+    if faces is not None:
+        if isinstance(mesh, Surface):
+            raise MeshError("the mesh is a Surface and has faces; leave out the second argument")
+        return Surface(mesh, faces)
     if isinstance(mesh, Surface):
         return mesh
-    if faces is not None:
-        return Surface(np.asarray(mesh), np.asarray(faces))
     if hasattr(mesh, "regular_faces"):  # pyvista
         if not mesh.is_all_triangles:
             raise MeshError("the PyVista mesh has faces other than triangles; call its triangulate() first")

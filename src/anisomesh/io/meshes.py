@@ -14,6 +14,7 @@ import numpy.typing as npt
 from anisomesh.errors import MeshFileError
 from anisomesh.io import ply, polygons, stl, text_formats, third_party_formats
 from anisomesh.io.atomic import atomic_path
+from anisomesh.io.convert import as_surface
 from anisomesh.mesh.surface import Surface
 
 logger = logging.getLogger(__name__)
@@ -61,14 +62,14 @@ def load(path: str | os.PathLike[str]) -> Surface:
     Quadrilaterals are split along their shorter diagonal, larger polygons into fans. Lines and volume cells are
     ignored. STL stores unconnected triangles; corners with equal coordinates are welded, which is logged.
     """
-    path = Path(path)
-    if path.is_dir():
-        raise MeshFileError(f"{path}: is a folder; expected a mesh file")
-    if not path.exists():
-        raise MeshFileError(f"{path}: no such file; expected a mesh file")
-    suffix = _known_suffix(path)
+    path = _as_path(path)
     try:
+        suffix = "" if path.is_dir() else _known_suffix(path)
         data = path.read_bytes()
+    except FileNotFoundError as error:
+        raise MeshFileError(f"{path}: no such file; expected a mesh file") from error
+    except IsADirectoryError as error:
+        raise MeshFileError(f"{path}: is a folder; expected a mesh file") from error
     except OSError as error:
         raise MeshFileError(f"{path}: cannot be read: {error.strerror or error}") from error
     if not data.strip():
@@ -86,13 +87,13 @@ def load(path: str | os.PathLike[str]) -> Surface:
         raise MeshFileError(f"{path}: cannot be read as {suffix[1:].upper()}: {reason}") from error
 
 
-def save(surface: Surface, path: str | os.PathLike[str], *, point_data: PointData | None = None) -> None:
+def save(surface: Any, path: str | os.PathLike[str], *, point_data: PointData | None = None) -> None:
     """Write a surface mesh atomically.
 
     Parameters
     ----------
     surface
-        The mesh to write.
+        The mesh to write: a :class:`Surface`, a ``trimesh.Trimesh`` or a ``pyvista.PolyData``.
     path
         The file, with one of the extensions of :func:`load`. An existing file is replaced.
     point_data
@@ -103,18 +104,21 @@ def save(surface: Surface, path: str | os.PathLike[str], *, point_data: PointDat
     ------
     MeshFileError
         If the format is unknown, the folder is missing or cannot be written, the disk is full, an array has the wrong
-        length, or a coordinate does not fit the format.
+        length or type, or a coordinate does not fit the format.
+    MeshError
+        If the object is not a mesh.
 
     Notes
     -----
     OBJ, OFF, PLY, VTU, MSH and MEDIT keep every float64 exactly; STL and GLB round to float32.
     """
-    path = Path(path)
+    path, surface = _as_path(path), as_surface(surface)
     suffix = _known_suffix(path)
-    data = {name: np.asarray(values) for name, values in (point_data or {}).items()}
-    for name, values in data.items():
-        if len(values) != surface.n_points:
-            raise MeshFileError(f"{path}: {name} has {len(values)} rows; expected one per point, {surface.n_points}")
+    data = {}
+    for name, values in (point_data or {}).items():
+        if not isinstance(name, str) or not name:
+            raise MeshFileError(f"{path}: {name!r} is not a name of point data")
+        data[name] = _point_array(path, name, values, surface.n_points)
     stored = {
         name: values for name, values in data.items() if suffix == ".vtu" or (suffix == ".ply" and values.ndim == 1)
     }
@@ -125,6 +129,27 @@ def save(surface: Surface, path: str | os.PathLike[str], *, point_data: PointDat
             _write(surface, temporary, stored)
         except ValueError as error:
             raise MeshFileError(f"{path}: cannot be written: {error}") from error
+
+
+def _as_path(path: str | os.PathLike[str]) -> Path:
+    if not isinstance(path, str | os.PathLike):
+        raise MeshFileError(f"{path!r} is not a file name")
+    return Path(path)
+
+
+def _point_array(path: Path, name: str, values: Any, n_points: int) -> npt.NDArray[Any]:
+    """Return point data as an array (V,) or (V, k) of integers or floats that every format can store."""
+    try:
+        array = np.asarray(values)
+    except ValueError as error:
+        raise MeshFileError(f"{path}: {name} cannot be read as an array: {error}") from error
+    if array.ndim not in (1, 2) or len(array) != n_points or array.size == 0:
+        raise MeshFileError(f"{path}: {name} has shape {array.shape}; expected ({n_points},) or ({n_points}, k)")
+    if array.dtype.kind not in "biuf":
+        raise MeshFileError(f"{path}: {name} has type {array.dtype}; expected integers or real numbers")
+    if array.dtype.kind == "b":
+        return array.astype(np.uint8)
+    return array.astype(np.float64) if array.dtype.itemsize not in (1, 2, 4, 8) or array.dtype == np.float16 else array
 
 
 def _write(surface: Surface, path: Path, data: dict[str, npt.NDArray[Any]]) -> None:

@@ -162,7 +162,12 @@ class Surface:
 
 
 def _validated(points: npt.NDArray[Any], faces: npt.NDArray[Any]) -> tuple[Points, Faces]:
-    points, faces = np.asarray(points), np.asarray(faces)
+    try:
+        points, faces = np.asarray(points), np.asarray(faces)
+    except ValueError as error:
+        raise MeshError(
+            f"points or faces have rows of different lengths ({error}); triangulate polygons first"
+        ) from error
     if points.dtype.kind not in "biuf":
         raise MeshError(f"points has dtype {points.dtype}; expected real numbers")
     points = np.array(points, dtype=np.float64, order="C")

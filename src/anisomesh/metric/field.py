@@ -9,9 +9,13 @@ import numpy as np
 import numpy.typing as npt
 
 from anisomesh._arrays import EmbeddedPoints, Points, PointTensors, real_array
+from anisomesh._values import real_number
 from anisomesh.errors import MetricError
 from anisomesh.mesh.surface import Surface
 from anisomesh.metric.tensors import validate_metric
+
+MAX_COORDINATE = 1e6  # of embedded points, in bounding-box diagonals: far above any metric, far below overflow
+_MAX_GROWTH = 10.0  # by which a source that removes noise may change the size of the surface
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -64,15 +68,20 @@ def checked_field(field: Any, surface: Surface) -> MetricField:
     tensors = validate_metric(field.tensors, surface)
     points = extra = None
     if field.points is not None:
-        points = _finite("points", field.points, (surface.n_points, 3))
+        points = _bounded("points", field.points, (surface.n_points, 3))
+        growth = float(np.linalg.norm(np.ptp(points, axis=0))) / surface.diagonal
+        if not 1.0 / _MAX_GROWTH < growth < _MAX_GROWTH:
+            raise MetricError(f"points of the metric field change the size of the surface by a factor of {growth:.3g}")
     if field.extra is not None:
-        width = np.shape(field.extra)[-1] if np.ndim(field.extra) == 2 else 0
-        extra = _finite("extra", field.extra, (surface.n_points, width))
-    return MetricField(tensors=tensors, points=points, extra=extra, noise=field.noise)
+        extra = _bounded("extra", field.extra, (surface.n_points, None))
+    noise = real_number("noise of the metric field", field.noise, MetricError)
+    if not (np.isfinite(noise) and noise >= 0.0):
+        raise MetricError(f"noise of the metric field is {noise}; expected a length of at least 0")
+    return MetricField(tensors=tensors, points=points, extra=extra, noise=noise)
 
 
-def _finite(name: str, values: Any, shape: tuple[int, ...]) -> npt.NDArray[np.float64]:
+def _bounded(name: str, values: Any, shape: tuple[int | None, ...]) -> npt.NDArray[np.float64]:
     array = real_array(f"{name} of the metric field", values, shape, MetricError)
-    if not np.isfinite(array).all():
-        raise MetricError(f"{name} of the metric field has a number that is not finite")
+    if not (np.abs(array) <= MAX_COORDINATE).all():
+        raise MetricError(f"{name} of the metric field has a number that is not finite or above {MAX_COORDINATE:g}")
     return array

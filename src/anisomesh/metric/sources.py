@@ -4,7 +4,11 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
+import numpy as np
+
 from anisomesh._arrays import PointTensors
+from anisomesh._values import real_number, whole_number
+from anisomesh.errors import OptionError
 from anisomesh.mesh.surface import Surface
 from anisomesh.metric.curvature import principal_curvatures
 from anisomesh.metric.field import MetricField
@@ -16,6 +20,8 @@ from anisomesh.metric.tensors import (
     uniform_metric,
     validate_metric,
 )
+
+_MAX_RADIUS = 50  # rings of edges; the time of a fit grows with the square
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -30,7 +36,12 @@ class Curvature:
     smoothing
         Number of one-ring averages of the tensors, 0 for none.
     radius
-        Rings of edges over which curvature is fitted, at least 2.
+        Rings of edges over which curvature is fitted, 2 to 50.
+
+    Raises
+    ------
+    OptionError
+        If a parameter is out of range.
 
     References
     ----------
@@ -40,6 +51,9 @@ class Curvature:
     limits: tuple[float, float] = DEFAULT_LIMITS
     smoothing: int = DEFAULT_SMOOTHING
     radius: int = 5
+
+    def __post_init__(self) -> None:
+        _check_fit(self.limits, self.smoothing, self.radius)
 
     def __call__(self, surface: Surface) -> MetricField:
         """Return the metric at the points of a surface."""
@@ -62,11 +76,26 @@ class Approximation:
     smoothing: int = DEFAULT_SMOOTHING
     radius: int = 5
 
+    def __post_init__(self) -> None:
+        _check_fit(self.limits, self.smoothing, self.radius)
+
     def __call__(self, surface: Surface) -> MetricField:
         """Return the metric at the points of a surface."""
         curvature = principal_curvatures(surface, radius=self.radius)
         tensors = approximation_metric(surface, curvature, limits=self.limits, smoothing=self.smoothing)
         return MetricField(tensors=tensors)
+
+
+def _check_fit(limits: object, smoothing: object, radius: object) -> None:
+    """Check the parameters of a measured metric."""
+    if not isinstance(limits, tuple) or len(limits) != 2:
+        raise OptionError(f"limits = {limits!r}; expected two numbers, the lowest and the highest curvature")
+    low, high = (real_number("limits", limit) for limit in limits)
+    if not 0.0 < low <= high < np.inf:
+        raise OptionError(f"limits = {limits}; expected two numbers with 0 < low <= high")
+    whole_number("smoothing", smoothing, 0)
+    if whole_number("radius", radius, 2) > _MAX_RADIUS:
+        raise OptionError(f"radius = {radius}; expected at most {_MAX_RADIUS} rings of edges")
 
 
 @dataclass(frozen=True)

@@ -21,6 +21,7 @@ from anisomesh.voronoi.threads import Workers
 # thread that returns from a kernel may wait for the interpreter (benchmarks/speed.py)
 _MIN_CHUNK, _MAX_CHUNK, _MIN_CHUNKS = 1024, 4096, 4
 _MAX_REPAIR_ROUNDS = 40  # each doubles buffers or lengthens lists, so far fewer suffice for any memory
+_MAX_SITE_COORDINATE = 1e50  # of sites: squared distances stay far from overflow
 _INITIAL_BUFFER_SIZE = 64  # polygon vertices per facet
 
 _T = TypeVar("_T")
@@ -150,6 +151,8 @@ class RestrictedVoronoi:
         sites = np.require(sites, np.float64, ["C", "W"])
         if sites.ndim != 2 or sites.shape[1] != self.embedded.dimension or len(sites) == 0:
             raise OptionError(f"sites has shape {sites.shape}; expected (S, {self.embedded.dimension}) with S >= 1")
+        if not (np.abs(sites) <= _MAX_SITE_COORDINATE).all():
+            raise OptionError("a site is not finite or far beyond the surface, as after a step with masses of 0")
         new = len(sites) != self._lists.n_sites
         self._table = self._lists.table(sites, exact=exact)
         if new:

@@ -8,6 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from anisomesh._arrays import PointTensors
+from anisomesh.errors import OptionError
 from anisomesh.learn import require_torch
 from anisomesh.mesh.surface import Surface
 from anisomesh.metric.curvature import principal_curvatures
@@ -41,6 +42,12 @@ class Neural:
     weights: str | os.PathLike[str] | None = None
     device: str = "cpu"
     denoise: bool = True
+
+    def __post_init__(self) -> None:
+        if not isinstance(self.weights, str | os.PathLike | None):
+            raise OptionError(f"weights = {self.weights!r}; expected the name of a network or of a file")
+        if not isinstance(self.denoise, bool):
+            raise OptionError(f"denoise = {self.denoise!r}; expected True or False")
 
     def __call__(self, surface: Surface) -> MetricField:
         """Return the metric at the points of a surface.
