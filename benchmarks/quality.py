@@ -20,12 +20,11 @@ import numpy as np
 import numpy.typing as npt
 
 import anisomesh
-from anisomesh import RemeshResult, Surface
+from anisomesh import MetricField, RemeshResult, Surface
 from anisomesh.caveats import COUNT_TOLERANCE
 from anisomesh.mesh.closest_points import ClosestPoints
 from anisomesh.metric.quality import anisotropic_quality
-from anisomesh.metric.tensors import metric_root
-from anisomesh.metric.transfer import transfer_metric_roots
+from anisomesh.metric.transfer import transfer_to_corners
 
 OUT = Path(__file__).parent / "out" / "quality.jsonl"
 
@@ -73,7 +72,8 @@ def euclidean_quality(mesh: Surface) -> npt.NDArray[np.float64]:
 def quality_in_own_metric(result: RemeshResult) -> float:
     """Return the mean quality of the triangles in the metric that was aimed at, at the working surface."""
     mesh = result.surface.with_points(result.frame.to_unit(result.surface.points))
-    roots = transfer_metric_roots(ClosestPoints(result.working), metric_root(result.tensors), mesh.points)
+    field = MetricField(tensors=result.tensors, corner_tensors=result.corner_tensors)
+    roots = transfer_to_corners(ClosestPoints(result.working), field, mesh)
     return float(anisotropic_quality(mesh.points, mesh.faces, roots).mean())
 
 

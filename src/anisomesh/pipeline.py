@@ -212,6 +212,7 @@ def _remesh(source: _Input, n: int, options: RemeshOptions, run: _Run) -> Remesh
         prepare_report=prepared.report,
         working=working,
         tensors=field.tensors,
+        corner_tensors=field.corner_tensors,
         embedding_name=embedding_name(options),
         noise=field.noise,
         frame=frame,

@@ -24,10 +24,10 @@ Noise turns all edges, so measured surfaces have next to none; machine parts hav
 """
 
 _RESAMPLING_FACTOR = 1.5  # sharpness of the energy by which sites are sampled anew, over the sharpness; heuristic
-_BUILT_IN: dict[str, Callable[[], MetricSource]] = {
-    "curvature": Curvature,
-    "approximation": Approximation,
-    "uniform": Uniform,
+_BUILT_IN: dict[str, Callable[[float], MetricSource]] = {
+    "curvature": lambda crease_angle: Curvature(crease_angle=crease_angle),
+    "approximation": lambda crease_angle: Approximation(crease_angle=crease_angle),
+    "uniform": lambda crease_angle: Uniform(),
 }
 
 
@@ -60,12 +60,12 @@ def metric_source(options: RemeshOptions, surface: Surface, tensors: PointTensor
     metric, name = options.metric, embedding_name(options)
     if not callable(metric):
         if name in ("neural", "hybrid"):
-            network = Hybrid if name == "hybrid" else Neural
-            metric = network(options.weights, options.device, options.denoise)
+            given = (options.weights, options.device, options.denoise)
+            metric = Hybrid(*given, options.feature_angle) if name == "hybrid" else Neural(*given)
         elif tensors is not None:
             return PrecomputedTensors(tensors)
         else:
-            return _BUILT_IN[str(metric)]()
+            return _BUILT_IN[str(metric)](options.feature_angle)
     if isinstance(metric, Neural):
         denoise = metric.denoise and options.denoise and share_of_flat_edges(surface) < DESIGNED_SHARE
         return replace(metric, denoise=denoise)

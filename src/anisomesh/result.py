@@ -6,7 +6,7 @@ import os
 from dataclasses import dataclass
 from typing import Any
 
-from anisomesh._arrays import PointTensors, Sites
+from anisomesh._arrays import CornerTensors, PointTensors, Sites
 from anisomesh.cvt.lbfgs import Status
 from anisomesh.embedding.base import Embedding
 from anisomesh.io.rvd import PolygonMesh, save_polygons
@@ -36,6 +36,8 @@ class RemeshResult:
         triangulated anew, noise removed. Its triangles may be other ones than those of ``prepared``.
     tensors
         The metric at the points of ``working`` (V, 3, 3), at bounding-box diagonal 1.
+    corner_tensors
+        The metric at the corners of the faces of ``working`` (F, 3, 3, 3) where it jumps across creases, else None.
     embedding_name
         ``"direct"``, ``"neural"`` or ``"hybrid"``, or the name of a metric source of the user.
     noise
@@ -67,6 +69,7 @@ class RemeshResult:
     prepare_report: PrepareReport
     working: Surface
     tensors: PointTensors
+    corner_tensors: CornerTensors | None
     embedding_name: str
     noise: float
     frame: Frame

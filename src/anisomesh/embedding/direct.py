@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from anisomesh._arrays import EmbeddedPoints, PointScalars, PointTensors
+from anisomesh._arrays import CornerTensors, EmbeddedPoints, PointScalars, PointTensors
 from anisomesh._kernels.local_step import local_step
 from anisomesh.embedding.base import Embedding, EmbeddingStatus, stretch_statistics
 from anisomesh.embedding.gradient import FaceGradient, FaceTensors, eigen_2x2, face_gradient, face_tensors
@@ -22,6 +22,7 @@ def embed(
     surface: Surface,
     tensors: PointTensors,
     *,
+    corner_tensors: CornerTensors | None = None,
     extra_dimensions: int = 5,
     max_iterations: int = 10,
     tolerance: float = 1e-3,
@@ -34,6 +35,8 @@ def embed(
         The surface at bounding-box diagonal 1; boundaries, several components and degenerate faces are allowed.
     tensors
         Symmetric positive definite metric (V, 3, 3).
+    corner_tensors
+        The metric at the corners of the faces (F, 3, 3, 3) if it jumps between faces.
     extra_dimensions
         Number of extra coordinates, at least 3.
     max_iterations
@@ -72,7 +75,7 @@ def embed(
             f"max_iterations is {max_iterations} and tolerance {tolerance}; expected at least 1 step and 0 or more"
         )
     gradient = face_gradient(surface)
-    metric = face_tensors(surface, tensors, gradient.frames)
+    metric = face_tensors(surface, tensors if corner_tensors is None else corner_tensors, gradient.frames)
     scale, root = _split(metric, gradient)
     if not root.any():
         extra, residual, iterations = np.zeros((surface.n_points, extra_dimensions)), 0.0, 0

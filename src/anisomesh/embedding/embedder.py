@@ -65,6 +65,7 @@ class Direct:
         return embed(
             surface,
             field.tensors,
+            corner_tensors=field.corner_tensors,
             extra_dimensions=self.extra_dimensions,
             max_iterations=self.iterations,
             tolerance=self.tolerance,

@@ -8,7 +8,7 @@ import numpy as np
 import numpy.typing as npt
 from scipy import sparse
 
-from anisomesh._arrays import FaceMask, FaceScalars, PointTensors
+from anisomesh._arrays import CornerTensors, FaceMask, FaceScalars, PointTensors
 from anisomesh.mesh.geometry import unit
 from anisomesh.mesh.surface import Surface
 
@@ -80,9 +80,12 @@ def face_gradient(surface: Surface) -> FaceGradient:
     return FaceGradient(operator, np.where(regular, surface.face_areas, 0.0), frames, regular)
 
 
-def face_tensors(surface: Surface, tensors: PointTensors, frames: FaceFrames) -> FaceTensors:
-    """Return tensors (V, 3, 3) averaged over the corners and restricted to the planes of the faces (F, 2, 2)."""
-    mean = tensors[surface.faces].mean(axis=1)
+def face_tensors(surface: Surface, tensors: PointTensors | CornerTensors, frames: FaceFrames) -> FaceTensors:
+    """Return tensors averaged over the corners and restricted to the planes of the faces (F, 2, 2).
+
+    The tensors are given at the points (V, 3, 3) or at the corners (F, 3, 3, 3).
+    """
+    mean = (tensors[surface.faces] if tensors.ndim == 3 else tensors).mean(axis=1)
     return np.asarray(frames @ mean @ frames.transpose(0, 2, 1))
 
 

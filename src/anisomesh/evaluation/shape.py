@@ -12,8 +12,8 @@ from anisomesh.mesh.closest_points import ClosestPoints
 from anisomesh.mesh.geometry import corner_angles
 from anisomesh.mesh.surface import Surface
 from anisomesh.metric.quality import anisotropic_quality
-from anisomesh.metric.tensors import compute_metric, metric_root
-from anisomesh.metric.transfer import transfer_metric_roots
+from anisomesh.metric.sources import Curvature
+from anisomesh.metric.transfer import transfer_to_corners
 
 _LOW_QUANTILE = 0.05  # of g_low and angle_low; a convention of this report
 
@@ -66,8 +66,8 @@ def quality_in_reference_metric(reference: ClosestPoints, surface: Surface) -> F
     ----------
     NASM, section 4.1; see :func:`anisomesh.metric.quality.anisotropic_quality`.
     """
-    roots = metric_root(compute_metric(reference.surface))
-    return anisotropic_quality(surface.points, surface.faces, transfer_metric_roots(reference, roots, surface.points))
+    field = Curvature()(reference.surface)
+    return anisotropic_quality(surface.points, surface.faces, transfer_to_corners(reference, field, surface))
 
 
 def shape_statistics(surface: Surface, quality: FaceScalars) -> ShapeStatistics:

@@ -16,6 +16,8 @@ from anisomesh.mesh.surface import Surface
 from anisomesh.mesh.topology import connected_components, edges_of
 from anisomesh.metric.tangent import tangent_frames, unit_normals
 
+DEFAULT_RADIUS = 5  # rings of edges over which curvature is fitted, as libigl has it
+
 _MIN_FIT_HEIGHT = 1e-6  # height over longest side of the faces that libigl may see; heuristic
 _MIN_SAFE_NORMAL = 1e-5  # mean unit normal of a ring: libigl ends the process at 0; far above rounding, 1e-16
 _MIN_RELIABLE_NORMAL = 0.1  # mean unit normal of a ring below which its fit is arbitrary; heuristic
@@ -46,7 +48,7 @@ class PrincipalCurvatures:
     trusted: PointMask
 
 
-def principal_curvatures(surface: Surface, *, radius: int = 5) -> PrincipalCurvatures:
+def principal_curvatures(surface: Surface, *, radius: int = DEFAULT_RADIUS) -> PrincipalCurvatures:
     """Return the principal curvatures of quadrics fitted to neighbourhoods of the points.
 
     Parameters

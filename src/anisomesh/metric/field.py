@@ -8,11 +8,11 @@ from typing import Any, Protocol
 import numpy as np
 import numpy.typing as npt
 
-from anisomesh._arrays import EmbeddedPoints, Points, PointTensors, real_array
+from anisomesh._arrays import CornerTensors, EmbeddedPoints, Points, PointTensors, real_array
 from anisomesh._values import real_number
 from anisomesh.errors import MetricError
 from anisomesh.mesh.surface import Surface
-from anisomesh.metric.tensors import validate_metric
+from anisomesh.metric.tensors import validate_metric, validate_tensors
 
 MAX_COORDINATE = 1e6  # of embedded points, in bounding-box diagonals: far above any metric, far below overflow
 _MAX_GROWTH = 10.0  # by which a source that removes noise may change the size of the surface
@@ -27,6 +27,9 @@ class MetricField:
     tensors
         Symmetric positive definite matrices M (V, 3, 3) in the coordinate axes; the length of a vector x is
         sqrt(x^t M x). Only ratios of lengths matter.
+    corner_tensors
+        The metric at the corners of the faces (F, 3, 3, 3), where it jumps across creases; None if it is continuous,
+        so that the corners have ``tensors[faces]``. ``tensors`` are then averages over the faces at a point.
     points
         Positions (V, 3) that the points of the surface are to have from here on, None to leave them: a source that
         removes noise moves them.
@@ -37,6 +40,7 @@ class MetricField:
     """
 
     tensors: PointTensors
+    corner_tensors: CornerTensors | None = None
     points: Points | None = None
     extra: EmbeddedPoints | None = None
     noise: float = 0.0
@@ -77,7 +81,14 @@ def checked_field(field: Any, surface: Surface) -> MetricField:
     noise = real_number("noise of the metric field", field.noise, MetricError)
     if not (np.isfinite(noise) and noise >= 0.0):
         raise MetricError(f"noise of the metric field is {noise}; expected a length of at least 0")
-    return MetricField(tensors=tensors, points=points, extra=extra, noise=noise)
+    corners = None
+    if field.corner_tensors is not None:
+        shape = (surface.n_faces, 3, 3, 3)
+        given = real_array("corner_tensors of the metric field", field.corner_tensors, shape, MetricError)
+        corners = validate_tensors(given.reshape(-1, 3, 3), np.arange(3 * surface.n_faces), "corner_tensors").reshape(
+            shape
+        )
+    return MetricField(tensors=tensors, corner_tensors=corners, points=points, extra=extra, noise=noise)
 
 
 def _bounded(name: str, values: Any, shape: tuple[int | None, ...]) -> npt.NDArray[np.float64]:

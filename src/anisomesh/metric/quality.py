@@ -5,14 +5,14 @@ from __future__ import annotations
 import numpy as np
 import numpy.typing as npt
 
-from anisomesh._arrays import Faces, FaceScalars, Points, PointTensors
+from anisomesh._arrays import CornerTensors, Faces, FaceScalars, Points, PointTensors
 
 _QUALITY_BLOCK = 16_384  # triangles at once, to bound the memory of intermediate arrays
 
 Corners = npt.NDArray[np.float64]
 
 
-def anisotropic_quality(points: Points, faces: Faces, roots: PointTensors) -> FaceScalars:
+def anisotropic_quality(points: Points, faces: Faces, roots: PointTensors | CornerTensors) -> FaceScalars:
     """Return the quality G (F,) of each triangle: 1 if equilateral in the metric, 0 if degenerate.
 
     Parameters
@@ -20,7 +20,8 @@ def anisotropic_quality(points: Points, faces: Faces, roots: PointTensors) -> Fa
     points, faces
         The triangles.
     roots
-        Symmetric square roots Q of the metric at the points (V, 3, 3); a common factor has no effect.
+        Symmetric square roots Q of the metric at the points (V, 3, 3), or at the corners of the triangles
+        (F, 3, 3, 3); a common factor has no effect.
 
     Notes
     -----
@@ -35,7 +36,8 @@ def anisotropic_quality(points: Points, faces: Faces, roots: PointTensors) -> Fa
     result = np.empty(len(faces))
     for first in range(0, len(faces), _QUALITY_BLOCK):
         block = faces[first : first + _QUALITY_BLOCK]
-        result[first : first + _QUALITY_BLOCK] = _quality(points[block], roots[block].mean(axis=1))
+        corners = roots[block] if roots.ndim == 3 else roots[first : first + _QUALITY_BLOCK]
+        result[first : first + _QUALITY_BLOCK] = _quality(points[block], corners.mean(axis=1))
     return result
 
 

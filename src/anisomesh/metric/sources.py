@@ -10,8 +10,9 @@ from anisomesh._arrays import PointTensors
 from anisomesh._values import real_number, whole_number
 from anisomesh.errors import OptionError
 from anisomesh.mesh.surface import Surface
-from anisomesh.metric.curvature import principal_curvatures
+from anisomesh.metric.curvature import DEFAULT_RADIUS, principal_curvatures
 from anisomesh.metric.field import MetricField
+from anisomesh.metric.patches import smooth_patches
 from anisomesh.metric.tensors import (
     DEFAULT_LIMITS,
     DEFAULT_SMOOTHING,
@@ -37,6 +38,9 @@ class Curvature:
         Number of one-ring averages of the tensors, 0 for none.
     radius
         Rings of edges over which curvature is fitted, 2 to 50.
+    crease_angle
+        Edges whose dihedral angle deviates from flat by more degrees than this are creases, 180 for none. Curvature is
+        neither fitted nor averaged across them, so that flat faces have none.
 
     Raises
     ------
@@ -50,15 +54,17 @@ class Curvature:
 
     limits: tuple[float, float] = DEFAULT_LIMITS
     smoothing: int = DEFAULT_SMOOTHING
-    radius: int = 5
+    radius: int = DEFAULT_RADIUS
+    crease_angle: float = 40.0
 
     def __post_init__(self) -> None:
-        _check_fit(self.limits, self.smoothing, self.radius)
+        _check_fit(self.limits, self.smoothing, self.radius, self.crease_angle)
 
     def __call__(self, surface: Surface) -> MetricField:
         """Return the metric at the points of a surface."""
-        curvature = principal_curvatures(surface, radius=self.radius)
-        return MetricField(tensors=curvature_metric(surface, curvature, limits=self.limits, smoothing=self.smoothing))
+        patches = smooth_patches(surface, self.crease_angle, self.radius)
+        curvature = principal_curvatures(patches.surface, radius=self.radius)
+        return patches.field(curvature_metric(patches.surface, curvature, limits=self.limits, smoothing=self.smoothing))
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -74,19 +80,22 @@ class Approximation:
 
     limits: tuple[float, float] = DEFAULT_LIMITS
     smoothing: int = DEFAULT_SMOOTHING
-    radius: int = 5
+    radius: int = DEFAULT_RADIUS
+    crease_angle: float = 40.0
 
     def __post_init__(self) -> None:
-        _check_fit(self.limits, self.smoothing, self.radius)
+        _check_fit(self.limits, self.smoothing, self.radius, self.crease_angle)
 
     def __call__(self, surface: Surface) -> MetricField:
         """Return the metric at the points of a surface."""
-        curvature = principal_curvatures(surface, radius=self.radius)
-        tensors = approximation_metric(surface, curvature, limits=self.limits, smoothing=self.smoothing)
-        return MetricField(tensors=tensors)
+        patches = smooth_patches(surface, self.crease_angle, self.radius)
+        curvature = principal_curvatures(patches.surface, radius=self.radius)
+        return patches.field(
+            approximation_metric(patches.surface, curvature, limits=self.limits, smoothing=self.smoothing)
+        )
 
 
-def _check_fit(limits: object, smoothing: object, radius: object) -> None:
+def _check_fit(limits: object, smoothing: object, radius: object, crease_angle: object) -> None:
     """Check the parameters of a measured metric."""
     if not isinstance(limits, tuple) or len(limits) != 2:
         raise OptionError(f"limits = {limits!r}; expected two numbers, the lowest and the highest curvature")
@@ -96,6 +105,8 @@ def _check_fit(limits: object, smoothing: object, radius: object) -> None:
     whole_number("smoothing", smoothing, 0)
     if whole_number("radius", radius, 2) > _MAX_RADIUS:
         raise OptionError(f"radius = {radius}; expected at most {_MAX_RADIUS} rings of edges")
+    if not 0.0 <= real_number("crease_angle", crease_angle) <= 180.0:
+        raise OptionError(f"crease_angle = {crease_angle}; expected 0 to 180 degrees")
 
 
 @dataclass(frozen=True)

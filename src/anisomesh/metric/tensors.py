@@ -190,14 +190,18 @@ def validate_metric(
         entry is not between 1e-100 and 1e100; names the first such point.
     """
     matrices = real_array("metric", tensors, (surface.n_points, 3, 3), MetricError)
-    names = np.arange(len(matrices)) if numbers is None else numbers
+    return validate_tensors(matrices, np.arange(len(matrices)) if numbers is None else numbers, "metric")
+
+
+def validate_tensors(matrices: PointTensors, numbers: npt.NDArray[np.integer], name: str) -> PointTensors:
+    """Return tensors (n, 3, 3) as exactly symmetric ones; errors as :func:`validate_metric`, with name and numbers."""
 
     def reject(invalid: npt.ArrayLike, reason: str) -> None:
         where = np.flatnonzero(invalid)
         if len(where):
             raise MetricError(
-                f"metric[{names[where[0]]}] = {matrices[where[0]].tolist()} {reason} ({len(where)} such points); "
-                "expected a symmetric positive definite 3x3 matrix at every point"
+                f"{name}[{numbers[where[0]]}] = {matrices[where[0]].tolist()} {reason} ({len(where)} such places); "
+                "expected a symmetric positive definite 3x3 matrix everywhere"
             )
 
     reject(~np.isfinite(matrices).all(axis=(1, 2)), "has an entry that is not finite")

@@ -4,9 +4,16 @@ from __future__ import annotations
 
 import numpy as np
 
-from anisomesh._arrays import Points, PointTensors
+from anisomesh._arrays import CornerTensors, Points, PointTensors
 from anisomesh.errors import MetricError
 from anisomesh.mesh.closest_points import ClosestPoints
+from anisomesh.mesh.surface import Surface
+from anisomesh.metric.field import MetricField
+from anisomesh.metric.tensors import metric_root
+
+_INSET = (
+    0.1  # of the way from a corner to the barycentre: on its side of a crease also if the triangle is off by a little
+)
 
 
 def transfer_metric_roots(reference: ClosestPoints, roots: PointTensors, query_points: Points) -> PointTensors:
@@ -35,3 +42,18 @@ def transfer_metric_roots(reference: ClosestPoints, roots: PointTensors, query_p
         raise MetricError(f"roots has shape {roots.shape}; expected ({surface.n_points}, 3, 3)")
     facet, weights = reference.locate(query_points)
     return np.asarray(np.einsum("nc,ncij->nij", weights, roots[surface.faces[facet]]))
+
+
+def transfer_to_corners(reference: ClosestPoints, field: MetricField, surface: Surface) -> PointTensors | CornerTensors:
+    """Return the roots of a metric field of a reference at the points (V, 3, 3) of another surface near it.
+
+    Where the field jumps across creases they are returned at the corners of its faces (F, 3, 3, 3), from the closest
+    point of the reference to a place just inside the corner, on its side of the crease.
+    """
+    if field.corner_tensors is None:
+        return transfer_metric_roots(reference, metric_root(field.tensors), surface.points)
+    corners = surface.points[surface.faces]
+    inside = corners + _INSET * (corners.mean(axis=1, keepdims=True) - corners)
+    facet, weights = reference.locate(inside.reshape(-1, 3))
+    roots = metric_root(field.corner_tensors.reshape(-1, 3, 3)).reshape(-1, 3, 3, 3)
+    return np.asarray(np.einsum("nc,ncij->nij", weights, roots[facet])).reshape(-1, 3, 3, 3)

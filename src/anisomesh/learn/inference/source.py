@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import os
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -11,9 +11,10 @@ from anisomesh._arrays import PointTensors
 from anisomesh.errors import OptionError
 from anisomesh.learn import require_torch
 from anisomesh.mesh.surface import Surface
-from anisomesh.metric.curvature import principal_curvatures
+from anisomesh.metric.curvature import DEFAULT_RADIUS, principal_curvatures
 from anisomesh.metric.field import MetricField
 from anisomesh.metric.line_field import line_field_components, principal_stretch, tensors_of_line_field
+from anisomesh.metric.patches import smooth_patches
 from anisomesh.metric.tangent import tangent_frames, unit_normals
 from anisomesh.metric.tensors import curvature_metric
 
@@ -72,20 +73,31 @@ class Hybrid(Neural):
     """A mean of the network's metric and the measured one, on the surface without the noise that the network finds.
 
     Where curvature cannot be measured reliably, the network's metric alone.
+
+    Parameters
+    ----------
+    crease_angle
+        As for :class:`~anisomesh.metric.sources.Curvature`; the other parameters are the same as for :class:`Neural`.
     """
+
+    crease_angle: float = 40.0
 
     def __call__(self, surface: Surface) -> MetricField:
         """Return the metric at the points of a surface; errors as :class:`Neural`."""
         field = super().__call__(surface)
         denoised = surface if field.points is None else surface.with_points(field.points)
-        return MetricField(tensors=_blended(denoised, field.tensors), points=field.points, noise=field.noise)
+        blended = _blended(denoised, field.tensors, self.crease_angle)
+        return replace(blended, points=field.points, noise=field.noise)
 
 
-def _blended(surface: Surface, predicted: PointTensors) -> PointTensors:
+def _blended(surface: Surface, predicted: PointTensors, crease_angle: float) -> MetricField:
     """Return the weighted mean, as line fields, of a predicted metric (V, 3, 3) and the measured one."""
-    curvature = principal_curvatures(surface)
-    measured = curvature_metric(surface, curvature)
-    frames = tangent_frames(unit_normals(surface))
-    own, other = (line_field_components(*principal_stretch(tensors), frames) for tensors in (predicted, measured))
+    patches = smooth_patches(surface, crease_angle, DEFAULT_RADIUS)
+    curvature = principal_curvatures(patches.surface, radius=DEFAULT_RADIUS)
+    measured = curvature_metric(patches.surface, curvature)
+    frames = tangent_frames(unit_normals(patches.surface))
+    own, other = (
+        line_field_components(*principal_stretch(tensors), frames) for tensors in (predicted[patches.source], measured)
+    )
     share = np.where(curvature.trusted, MEASURED_SHARE, 0.0)[:, None]
-    return tensors_of_line_field((1.0 - share) * own + share * other, frames)
+    return patches.field(tensors_of_line_field((1.0 - share) * own + share * other, frames))
