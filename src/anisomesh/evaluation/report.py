@@ -129,7 +129,7 @@ def evaluate(
         distance=surface_distance(a, b, samples=samples, seed=rng),
         vertex_rms=float(np.sqrt(squared.mean())),
         vertex_max=float(np.sqrt(squared.max())),
-        shape=shape_statistics(b, quality_in_reference_metric(closest, b)),
+        shape=shape_statistics(b, quality_in_reference_metric(a, b)),
         features=feature_preservation(a, b, crease_angle=crease_angle),
         boundary=boundary_distance(a, b),
         validity=check_validity(b, a),

@@ -8,13 +8,17 @@ from typing import Any
 import numpy as np
 
 from anisomesh._arrays import FaceScalars
+from anisomesh.features.detect import sharp_edges
 from anisomesh.mesh.closest_points import ClosestPoints
 from anisomesh.mesh.geometry import corner_angles
 from anisomesh.mesh.surface import Surface
+from anisomesh.mesh.working_surface import working_surface
 from anisomesh.metric.quality import anisotropic_quality
 from anisomesh.metric.sources import Curvature
 from anisomesh.metric.transfer import transfer_to_corners
 
+_EVEN_VERTICES = 5_000  # of the even mesh on which the metric is measured, if the reference has larger triangles
+_WEAK_ANGLE = 20.0  # degrees; edges of the reference that are sharper stay in place; heuristic
 _LOW_QUANTILE = 0.05  # of g_low and angle_low; a convention of this report
 
 
@@ -51,23 +55,30 @@ class ShapeStatistics:
         return asdict(self)
 
 
-def quality_in_reference_metric(reference: ClosestPoints, surface: Surface) -> FaceScalars:
+def quality_in_reference_metric(reference: Surface, surface: Surface) -> FaceScalars:
     """Return the quality G (F,) of the triangles of a remesh in the curvature metric of its reference.
 
     Parameters
     ----------
     reference
-        Search tree of the reference, at bounding-box diagonal 1. Each vertex of the remesh takes the metric of its
-        closest point.
+        The reference, at bounding-box diagonal 1. Each corner of the remesh takes the metric of its closest point, on
+        its side of a crease.
     surface
         The remesh, in the coordinates of the reference.
+
+    Notes
+    -----
+    Curvature cannot be measured on slivers and large triangles, so they are triangulated anew first, as for a remesh.
+    Other references are measured as they are.
 
     References
     ----------
     NASM, section 4.1; see :func:`anisomesh.metric.quality.anisotropic_quality`.
     """
-    field = Curvature()(reference.surface)
-    return anisotropic_quality(surface.points, surface.faces, transfer_to_corners(reference, field, surface))
+    creases = sharp_edges(reference, _WEAK_ANGLE)
+    even = working_surface(reference, _EVEN_VERTICES, creases=creases, tagged=np.zeros_like(creases)).surface
+    roots = transfer_to_corners(ClosestPoints(even), Curvature()(even), surface)
+    return anisotropic_quality(surface.points, surface.faces, roots)
 
 
 def shape_statistics(surface: Surface, quality: FaceScalars) -> ShapeStatistics:

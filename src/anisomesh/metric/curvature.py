@@ -16,13 +16,13 @@ from anisomesh.mesh.surface import Surface
 from anisomesh.mesh.topology import connected_components, edges_of
 from anisomesh.metric.tangent import tangent_frames, unit_normals
 
+MAX_FLAT_CURVATURE = 1e-3  # curvature times bounding-box diagonal; heuristic, a thousandth of the lower limit
 DEFAULT_RADIUS = 5  # rings of edges over which curvature is fitted, as libigl has it
 
 _MIN_FIT_HEIGHT = 1e-6  # height over longest side of the faces that libigl may see; heuristic
 _MIN_SAFE_NORMAL = 1e-5  # mean unit normal of a ring: libigl ends the process at 0; far above rounding, 1e-16
 _MIN_RELIABLE_NORMAL = 0.1  # mean unit normal of a ring below which its fit is arbitrary; heuristic
 _MIN_TANGENT_PART = 0.1  # length of a fitted unit direction in the tangent plane, sine of the angle; heuristic
-_MAX_FLAT_CURVATURE = 1e-3  # curvature times bounding-box diagonal; heuristic, a thousandth of the lower limit
 _RING_BLOCK = 1024  # points at once, to bound the memory of their rings
 
 PointPairs = npt.NDArray[np.float64]
@@ -88,7 +88,7 @@ def principal_curvatures(surface: Surface, *, radius: int = DEFAULT_RADIUS) -> P
     trusted = directed
     if not directed.all():
         rough_values, rough_steepest = _taubin_curvatures(surface, normals)
-        flat = np.abs(rough_values[:, 1]) * surface.diagonal < _MAX_FLAT_CURVATURE
+        flat = np.abs(rough_values[:, 1]) * surface.diagonal < MAX_FLAT_CURVATURE
         trusted = np.asarray(directed | (fitted & flat))
         values = np.where(directed[:, None], values, rough_values)
         steepest = np.where(directed[:, None], steepest, rough_steepest)

@@ -10,7 +10,6 @@ import numpy.typing as npt
 
 from anisomesh._arrays import FaceScalars
 from anisomesh.evaluation.shape import quality_in_reference_metric
-from anisomesh.mesh.closest_points import ClosestPoints
 from anisomesh.mesh.distance import squared_distances
 from anisomesh.mesh.geometry import unit_frame
 from anisomesh.mesh.surface import Surface
@@ -100,7 +99,7 @@ def quality_colouring(surface: Surface, reference: Surface) -> Colouring:
     """
     frame = unit_frame(reference.points)
     base = reference.with_points(frame.to_unit(reference.points))
-    values = quality_in_reference_metric(ClosestPoints(base), surface.with_points(frame.to_unit(surface.points)))
+    values = quality_in_reference_metric(base, surface.with_points(frame.to_unit(surface.points)))
     name = f"quality G of the triangles in the metric, mean {_mean(values):.2f}"
     return Colouring(values=values, name=name, colours="RdYlBu", part=(0.05, 0.8), low=0.0, high=1.0)
 

@@ -11,7 +11,7 @@ from anisomesh._arrays import PointTensors
 from anisomesh.errors import OptionError
 from anisomesh.learn import require_torch
 from anisomesh.mesh.surface import Surface
-from anisomesh.metric.curvature import DEFAULT_RADIUS, principal_curvatures
+from anisomesh.metric.curvature import DEFAULT_RADIUS, MAX_FLAT_CURVATURE, principal_curvatures
 from anisomesh.metric.field import MetricField
 from anisomesh.metric.line_field import line_field_components, principal_stretch, tensors_of_line_field
 from anisomesh.metric.patches import smooth_patches
@@ -72,7 +72,7 @@ class Neural:
 class Hybrid(Neural):
     """A mean of the network's metric and the measured one, on the surface without the noise that the network finds.
 
-    Where curvature cannot be measured reliably, the network's metric alone.
+    Where curvature cannot be measured reliably it is the network's metric alone, and on flat parts the measured one.
 
     Parameters
     ----------
@@ -99,5 +99,6 @@ def _blended(surface: Surface, predicted: PointTensors, crease_angle: float) -> 
     own, other = (
         line_field_components(*principal_stretch(tensors), frames) for tensors in (predicted[patches.source], measured)
     )
-    share = np.where(curvature.trusted, MEASURED_SHARE, 0.0)[:, None]
+    flat = np.abs(curvature.values[:, 1]) * surface.diagonal < MAX_FLAT_CURVATURE
+    share = np.where(flat, 1.0, np.where(curvature.trusted, MEASURED_SHARE, 0.0))[:, None]
     return patches.field(tensors_of_line_field((1.0 - share) * own + share * other, frames))
