@@ -221,7 +221,7 @@ def test_a_wrong_tensor_is_named_by_the_point_of_the_input():
     tensors[:3] = 0.0
     anisomesh.remesh(surface, n_vertices=40, metric=tensors, **FEW)
     tensors[10] = np.diag([1.0, 2.0, -5.0])
-    with pytest.raises(MetricError, match=r"metric\[10\] = .*-5\.0.*\(1 such points\)"):
+    with pytest.raises(MetricError, match=r"metric\[10\] = .*-5\.0.*\(1 such places\)"):
         anisomesh.remesh(surface, n_vertices=40, metric=tensors)
     with pytest.raises(OptionError, match=r"density\[10\] = 0"):
         anisomesh.remesh(surface, n_vertices=40, density=np.where(np.arange(surface.n_points) == 10, 0.0, 1.0))

@@ -2,9 +2,14 @@
 
 import numpy as np
 import pytest
+from sliver_shapes import thick_comb
 
-from anisomesh.evaluation.shape import shape_statistics
+from anisomesh.evaluation.shape import quality_in_reference_metric, shape_statistics
+from anisomesh.features.detect import sharp_edges
+from anisomesh.mesh.geometry import unit_frame
 from anisomesh.mesh.surface import Surface
+from anisomesh.mesh.working_surface import working_surface
+from anisomesh.metric.quality import anisotropic_quality
 from anisomesh.shapes.analytic import sphere
 
 
@@ -16,6 +21,19 @@ def test_a_right_triangle():
     assert statistics.angle_max == pytest.approx(90.0)
     assert (statistics.edge_min, statistics.edge_mean, statistics.edge_max) == pytest.approx((3, 4, 5))
     assert statistics.edge_variation == pytest.approx(np.sqrt(2 / 3) / 4)
+
+
+def test_slivers_of_the_reference_do_not_decide_the_metric():
+    """In the planes of a plate the metric is the identity, so that G is the Euclidean quality."""
+    plate = thick_comb(60, bulge=0.2)
+    plate = plate.with_points(unit_frame(plate.points).to_unit(plate.points))
+    creases = sharp_edges(plate, 20.0)
+    even = working_surface(plate, 2000, creases=creases, tagged=np.zeros_like(creases)).surface
+    quality = quality_in_reference_metric(plate, even)
+    euclidean = anisotropic_quality(even.points, even.faces, np.tile(np.eye(3), (even.n_points, 1, 1)))
+    flat = np.abs(even.face_normals[:, 2]) > 1.0 - 1e-9
+    np.testing.assert_allclose(quality[flat], euclidean[flat], atol=1e-6)
+    assert (euclidean[~flat] - quality[~flat]).max() > 0.1
 
 
 def test_an_icosahedron_is_regular():

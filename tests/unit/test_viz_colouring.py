@@ -29,7 +29,7 @@ def test_distance_sees_a_face_whose_corners_are_all_on_the_surface():
 
 
 def test_quality_is_that_in_the_metric_of_the_reference():
-    surface = ellipsoid(subdivisions=3)
+    surface = ellipsoid((1.0, 0.8, 0.6), subdivisions=3)
     unit = surface.with_points(unit_frame(surface.points).to_unit(surface.points))
     expected = anisotropic_quality(unit.points, unit.faces, metric_root(compute_metric(unit)))
     assert quality_colouring(surface, surface).values == pytest.approx(expected, abs=1e-6)

@@ -17,7 +17,8 @@ from anisomesh.metric.quality import anisotropic_quality
 from anisomesh.metric.sources import Curvature
 from anisomesh.metric.transfer import transfer_to_corners
 
-_EVEN_VERTICES = 5_000  # of the even mesh on which the metric is measured, if the reference has larger triangles
+_MIN_QUALITY = 0.7  # of the triangles of a reference, below which they are slivers; heuristic
+_EVEN_VERTICES = 5_000  # of the even mesh with which they are replaced
 _WEAK_ANGLE = 20.0  # degrees; edges of the reference that are sharper stay in place; heuristic
 _LOW_QUANTILE = 0.05  # of g_low and angle_low; a convention of this report
 
@@ -68,16 +69,19 @@ def quality_in_reference_metric(reference: Surface, surface: Surface) -> FaceSca
 
     Notes
     -----
-    Curvature cannot be measured on slivers and large triangles, so they are triangulated anew first, as for a remesh.
-    Other references are measured as they are.
+    Curvature cannot be measured on slivers. A reference whose triangles have a mean Euclidean quality below .7, by
+    area, is triangulated anew first, as for a remesh; other ones are measured as they are.
 
     References
     ----------
     NASM, section 4.1; see :func:`anisomesh.metric.quality.anisotropic_quality`.
     """
-    creases = sharp_edges(reference, _WEAK_ANGLE)
-    even = working_surface(reference, _EVEN_VERTICES, creases=creases, tagged=np.zeros_like(creases)).surface
-    roots = transfer_to_corners(ClosestPoints(even), Curvature()(even), surface)
+    identity = np.broadcast_to(np.eye(3), (reference.n_points, 3, 3))
+    euclidean = anisotropic_quality(reference.points, reference.faces, identity)
+    if (euclidean * reference.face_areas).sum() < _MIN_QUALITY * reference.area:
+        creases = sharp_edges(reference, _WEAK_ANGLE)
+        reference = working_surface(reference, _EVEN_VERTICES, creases=creases, tagged=np.zeros_like(creases)).surface
+    roots = transfer_to_corners(ClosestPoints(reference), Curvature()(reference), surface)
     return anisotropic_quality(surface.points, surface.faces, roots)
 
 
