@@ -32,6 +32,7 @@ from anisomesh.mesh.surface import Surface
 from anisomesh.mesh.validity import check_validity
 from anisomesh.mesh.working_surface import working_surface
 from anisomesh.metric.field import checked_field
+from anisomesh.metric.narrow_patches import limit_to_patches
 from anisomesh.metric.tensors import validate_metric
 from anisomesh.options import RemeshOptions
 from anisomesh.progress import OnStep, StepInfo, ignore_steps
@@ -178,6 +179,7 @@ def _remesh(source: _Input, n: int, options: RemeshOptions, run: _Run) -> Remesh
         if field.points is not None:
             working = working.with_points(field.points)
             surface = surface.with_points(field.points[: surface.n_points])
+        field = limit_to_patches(field, working, n)
     with run.stage("embed"):
         embedding = checked_embedding(embedder(options)(working, field), working)
     run.check_time()

@@ -16,6 +16,7 @@ from anisomesh.mesh.surface import Surface
 from anisomesh.mesh.topology import connected_components
 from anisomesh.mesh.working_surface import working_surface
 from anisomesh.metric.field import checked_field
+from anisomesh.metric.narrow_patches import _extent, limit_to_patches
 from anisomesh.metric.patches import cut_along, smooth_patches
 from anisomesh.metric.sources import Approximation, Curvature
 from anisomesh.metric.tensors import compute_metric
@@ -190,3 +191,46 @@ def test_patches_turn_with_the_surface():
     q *= np.sign(np.diag(r)) * np.sign(np.linalg.det(q * np.sign(np.diag(r))))
     turned = Curvature()(Surface(surface.points @ q.T, surface.faces)).corner_tensors
     np.testing.assert_allclose(turned, q @ Curvature()(surface).corner_tensors @ q.T, atol=1e-4)
+
+
+def capped(height):
+    return at_unit_size(cylinder(radius=0.5, height=height, n_around=48, n_along=max(2, round(48 * height))))
+
+
+@pytest.mark.parametrize("height", [0.05, 0.3])
+def test_the_extent_of_a_wall_is_its_height_along_the_axis_and_infinite_around(height):
+    surface = capped(height)
+    field = Curvature()(surface)
+    side = np.abs(surface.face_normals[:, 2]) < 1e-9
+    axis = np.broadcast_to(np.array([0.0, 0.0, 1.0]), (surface.n_faces, 3))
+    along = _extent(surface, field.patch, axis)[side]
+    np.testing.assert_allclose(along, np.ptp(surface.points[:, 2]), rtol=1e-9)
+    around = _extent(surface, field.patch, np.cross(surface.face_normals, axis))[side]
+    assert around.min() > 1e6
+
+
+def test_stretch_is_limited_where_the_patch_ends_within_a_spacing_and_nowhere_else():
+    surface = capped(0.05)
+    field = Curvature()(surface)
+    side = np.abs(surface.face_normals[:, 2]) < 1e-9
+    before = np.linalg.eigvalsh(field.corner_tensors)
+    largest = None
+    for n in (100, 400, 1_600):
+        limited = limit_to_patches(field, surface, n)
+        after = np.linalg.eigvalsh(limited.corner_tensors)
+        np.testing.assert_allclose(after[..., :2], before[..., :2], rtol=1e-9)
+        np.testing.assert_array_equal(limited.corner_tensors[~side], field.corner_tensors[~side])
+        assert (after[..., 2] <= before[..., 2] * (1.0 + 1e-9)).all()
+        assert largest is None or (after[side, :, 2] >= largest * (1.0 - 1e-9)).all()
+        largest = after[side, :, 2]
+    assert limit_to_patches(field, surface, 10**6) is field
+    spacing = np.sqrt(2.0 * surface.area / (np.sqrt(3.0) * 400))  # the stretch of the wall adds little area
+    stretch = np.sqrt(before[side, :, 2]) * np.ptp(surface.points[:, 2]) / spacing
+    after = np.linalg.eigvalsh(limit_to_patches(field, surface, 400).corner_tensors[side])
+    np.testing.assert_allclose(np.sqrt(after[..., 2]), np.maximum(stretch, 1.0), rtol=0.1)
+
+
+def test_a_metric_without_patches_is_not_limited():
+    surface = at_unit_size(torus(1.0, 0.4, 24, 12))
+    field = Curvature()(surface)
+    assert limit_to_patches(field, surface, 10) is field

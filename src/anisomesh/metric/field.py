@@ -8,9 +8,10 @@ from typing import Any, Protocol
 import numpy as np
 import numpy.typing as npt
 
-from anisomesh._arrays import CornerTensors, EmbeddedPoints, Points, PointTensors, real_array
+from anisomesh._arrays import CornerTensors, EmbeddedPoints, FaceLabels, Points, PointTensors, real_array
 from anisomesh._values import real_number
 from anisomesh.errors import MetricError
+from anisomesh.mesh.geometry import sums_at_points
 from anisomesh.mesh.surface import Surface
 from anisomesh.metric.tensors import validate_metric, validate_tensors
 
@@ -30,6 +31,8 @@ class MetricField:
     corner_tensors
         The metric at the corners of the faces (F, 3, 3, 3), where it jumps across creases; None if it is continuous,
         so that the corners have ``tensors[faces]``. ``tensors`` are then averages over the faces at a point.
+    patch
+        Number of the smooth patch of each face (F,), bounded by creases, if there are ``corner_tensors``.
     points
         Positions (V, 3) that the points of the surface are to have from here on, None to leave them: a source that
         removes noise moves them.
@@ -41,6 +44,7 @@ class MetricField:
 
     tensors: PointTensors
     corner_tensors: CornerTensors | None = None
+    patch: FaceLabels | None = None
     points: Points | None = None
     extra: EmbeddedPoints | None = None
     noise: float = 0.0
@@ -88,7 +92,20 @@ def checked_field(field: Any, surface: Surface) -> MetricField:
         corners = validate_tensors(given.reshape(-1, 3, 3), np.arange(3 * surface.n_faces), "corner_tensors").reshape(
             shape
         )
-    return MetricField(tensors=tensors, corner_tensors=corners, points=points, extra=extra, noise=noise)
+    patch = None
+    if field.patch is not None:
+        given = real_array("patch of the metric field", field.patch, (surface.n_faces,), MetricError)
+        patch = np.unique(given, return_inverse=True)[1].astype(np.int32)
+    return MetricField(tensors=tensors, corner_tensors=corners, patch=patch, points=points, extra=extra, noise=noise)
+
+
+def mean_at_points(surface: Surface, corner_tensors: CornerTensors) -> PointTensors:
+    """Return the area-weighted means (V, 3, 3) of tensors at the corners; the identity at points without area."""
+    sums = np.zeros((surface.n_points, 3, 3))
+    np.add.at(sums, surface.faces, surface.face_areas[:, None, None, None] * corner_tensors)
+    area = sums_at_points(surface.face_areas, surface.faces, surface.n_points)[:, None, None]
+    identity = np.broadcast_to(np.eye(3), sums.shape)
+    return np.asarray(np.divide(sums, area, out=np.array(identity), where=area > 0.0))
 
 
 def _bounded(name: str, values: Any, shape: tuple[int | None, ...]) -> npt.NDArray[np.float64]:

@@ -10,10 +10,9 @@ import numpy.typing as npt
 from anisomesh._arrays import EdgeMask, PointLabels, PointTensors
 from anisomesh.features.creases import select_creases
 from anisomesh.features.detect import sharp_edges
-from anisomesh.mesh.geometry import sums_at_points
 from anisomesh.mesh.surface import Surface
-from anisomesh.mesh.topology import corner_fans, side_pairs
-from anisomesh.metric.field import MetricField
+from anisomesh.mesh.topology import connected_components, corner_fans, side_pairs
+from anisomesh.metric.field import MetricField, mean_at_points
 
 
 @dataclass(frozen=True, eq=False)
@@ -40,13 +39,8 @@ class SmoothPatches:
         if self.surface is self.whole:
             return MetricField(tensors=tensors)
         corners = tensors[self.surface.faces]
-        weights = self.whole.face_areas[:, None, None, None]
-        total = sums_at_points(self.whole.face_areas, self.whole.faces, self.whole.n_points)[:, None, None]
-        sums = np.zeros_like(self.whole.points, shape=(self.whole.n_points, 3, 3))
-        np.add.at(sums, self.whole.faces, weights * corners)
-        mean = np.divide(sums, total, out=np.zeros_like(sums), where=total > 0.0)
-        mean[total[:, 0, 0] <= 0.0] = np.eye(3)
-        return MetricField(tensors=mean, corner_tensors=corners)
+        _, patch = connected_components(self.surface.faces, self.surface.n_points)
+        return MetricField(tensors=mean_at_points(self.whole, corners), corner_tensors=corners, patch=patch)
 
 
 def smooth_patches(surface: Surface, crease_angle: float, neighbourhood: int) -> SmoothPatches:
