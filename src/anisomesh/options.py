@@ -74,7 +74,8 @@ class RemeshOptions:
         Points of the input up to this distance (model units) are merged.
     feature_angle
         Edges of the input whose dihedral angle deviates from flat by more degrees than this are creases, which edges of
-        the result follow where there are enough vertices; 180 for none. The plain CVT (``sharpness`` 1) has none.
+        the result follow where there are enough vertices, and across which no curvature is measured; 180 for none. The
+        plain CVT (``sharpness`` 1) does not follow them.
     features
         Edges of the input that are creases in any case, as pairs of its points (n, 2).
     time_limit
