@@ -63,7 +63,8 @@ class RemeshOptions:
         Whether noise that a network finds in the input is removed first. Designed surfaces, on which a tenth of the
         edges or more are flat, are left as they are.
     seed
-        Seed of the start positions; the same seed and input give the same result.
+        Seed of the start positions; the same seed and input give the same result. If the mesh has inverted or
+        intersecting triangles that the input does not explain, the next two seeds are tried.
     threads
         Worker threads; they do not change the result.
     lloyd_iterations, max_iterations

@@ -14,11 +14,12 @@ import numpy.typing as npt
 from anisomesh._arrays import EdgeMask, PointScalars, PointTensors, real_array
 from anisomesh._values import real_number, whole_number
 from anisomesh.caveats import caveats
+from anisomesh.cvt.lbfgs import Optimised
 from anisomesh.cvt.schedule import DualFeedback, optimise_sites
 from anisomesh.deadline import Deadline
 from anisomesh.delaunay.creases import missing_on_creases
 from anisomesh.delaunay.dual import dual_squared_errors
-from anisomesh.delaunay.meshing import MeshingTask, mesh_from_sites
+from anisomesh.delaunay.meshing import MeshingTask, ValidMesh, mesh_from_sites
 from anisomesh.embedding.embedder import checked_embedding
 from anisomesh.errors import MetricError, OptionError, TimeLimitError
 from anisomesh.features.detect import sharp_edges
@@ -29,7 +30,7 @@ from anisomesh.memory import check_memory
 from anisomesh.mesh.embedded_surface import EmbeddedSurface
 from anisomesh.mesh.geometry import unit_frame
 from anisomesh.mesh.surface import Surface
-from anisomesh.mesh.validity import check_validity
+from anisomesh.mesh.validity import Validity, check_validity
 from anisomesh.mesh.working_surface import working_surface
 from anisomesh.metric.field import checked_field
 from anisomesh.metric.narrow_patches import limit_to_patches
@@ -44,7 +45,8 @@ from anisomesh.voronoi.restricted import RestrictedVoronoi
 
 WEAK_ANGLE = 20.0  # degrees; edges this sharp stay in the working surface, weak features among them; heuristic
 _LARGEST_DENSITY = 1e30  # and inverse of the smallest, so that energies are far from overflow
-MAX_RATIO = 1e12  # vertices per vertex of the input; more is a mistake
+_LARGEST_RATIO = 1e12  # vertices per vertex of the input; more is a mistake
+MAX_STARTS = 3  # of the optimisation, with one seed after the other, for a mesh without faults
 OPTIMISATION_SHARE = 0.6  # of the time limit, for everything up to the end of the optimisation
 
 
@@ -182,32 +184,19 @@ def _remesh(source: _Input, n: int, options: RemeshOptions, run: _Run) -> Remesh
         field = limit_to_patches(field, working, n)
     with run.stage("embed"):
         embedding = checked_embedding(embedder(options)(working, field), working)
-    run.check_time()
-    with run.stage("cvt"):
         density = None if source.density is None else split.interpolate(source.density)
         embedded = EmbeddedSurface(working, embedding.points, embedding.scale, density)
-        voronoi = RestrictedVoronoi(embedded, threads=options.threads)
-        features = _features(embedded, n, split.tagged, options)
-        optimised = optimise_sites(
-            voronoi,
-            n,
-            features,
-            cvt_options(options),
-            feedback=DualFeedback(dual_squared_errors, missing_on_creases),
-            on_step=run.on_step,
-            deadline=run.deadline.share(OPTIMISATION_SHARE),
-        )
-    with run.stage("dual"):
         task = MeshingTask(
-            voronoi=voronoi,
-            features=features,
+            voronoi=RestrictedVoronoi(embedded, threads=options.threads),
+            features=_features(embedded, n, split.tagged, options),
             surface=surface,
             tensors=field.tensors,
             n_vertices=n,
             deadline=run.deadline,
         )
-        mesh = mesh_from_sites(task, optimised.sites)
-        validity = check_validity(Surface(mesh.points, mesh.faces), surface)
+    run.check_time()
+    made = _valid_mesh(task, options, run)
+    mesh, optimised, validity = made.mesh, made.optimised, made.validity
     return RemeshResult(
         surface=Surface(frame.to_model(mesh.points), mesh.faces),
         prepared=prepared.surface,
@@ -226,10 +215,58 @@ def _remesh(source: _Input, n: int, options: RemeshOptions, run: _Run) -> Remesh
         status=optimised.status,
         inserted=mesh.inserted,
         removed=mesh.removed,
+        seed=made.seed,
         validity=validity,
         seconds=run.total_seconds(),
         warnings=tuple(caveats(n, field.noise, mesh, validity, optimised, options)),
     )
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class _Made:
+    """A mesh, the sites it was made from, and the seed of their start."""
+
+    mesh: ValidMesh
+    optimised: Optimised
+    validity: Validity
+    seed: int
+
+    @property
+    def faults(self) -> int:
+        """Faults that another start may avoid."""
+        return self.validity.inverted + self.validity.new_intersections + self.validity.flat
+
+
+def _valid_mesh(task: MeshingTask, options: RemeshOptions, run: _Run) -> _Made:
+    """Return the mesh of a task; from the next seeds while it has faults that the input does not explain."""
+    best = made = _mesh_of_start(task, options, run)
+    for seed in range(options.seed + 1, options.seed + MAX_STARTS):
+        explained = made.validity.self_intersections_input > 0 or made.mesh.from_input
+        if not best.faults or explained or run.deadline.passed():
+            break
+        fresh = RestrictedVoronoi(task.voronoi.embedded, threads=options.threads)
+        made = _mesh_of_start(replace(task, voronoi=fresh), replace(options, seed=seed), run)
+        if made.faults < best.faults:
+            best = made
+    return best
+
+
+def _mesh_of_start(task: MeshingTask, options: RemeshOptions, run: _Run) -> _Made:
+    """Return the mesh of a task from the sites that start from the seed of the options."""
+    with run.stage("cvt"):
+        optimised = optimise_sites(
+            task.voronoi,
+            task.n_vertices,
+            task.features,
+            cvt_options(options),
+            feedback=DualFeedback(dual_squared_errors, missing_on_creases),
+            on_step=run.on_step,
+            deadline=run.deadline.share(OPTIMISATION_SHARE),
+        )
+    with run.stage("dual"):
+        mesh = mesh_from_sites(task, optimised.sites)
+        validity = check_validity(Surface(mesh.points, mesh.faces), task.surface)
+    return _Made(mesh=mesh, optimised=optimised, validity=validity, seed=options.seed)
 
 
 def _features(embedded: EmbeddedSurface, n: int, tagged: EdgeMask, options: RemeshOptions) -> FeatureNetwork:
@@ -290,7 +327,7 @@ def _read_target(n_vertices: object, ratio: object, max_error: object) -> tuple[
             raise OptionError(f"max_error = {length}; expected a positive length in model units")
         return None, None, length
     share = real_number("ratio", ratio)
-    if not 0.0 < share <= MAX_RATIO:
+    if not 0.0 < share <= _LARGEST_RATIO:
         raise OptionError(f"ratio = {share}; expected a positive number, such as 0.2 for a fifth of the vertices")
     return None, share, None
 

@@ -54,6 +54,8 @@ class RemeshResult:
         Final energy of the optimisation at bounding-box diagonal 1, its iterations, and why it stopped.
     inserted, removed
         Points added to make the mesh valid, and points removed to reach the number of vertices asked for.
+    seed
+        Seed of the start positions: the next ones are tried if the mesh of the requested seed has faults.
     validity
         Checks of the result against the prepared input.
     distance
@@ -81,6 +83,7 @@ class RemeshResult:
     status: Status
     inserted: int
     removed: int
+    seed: int
     validity: Validity
     seconds: dict[str, float]
     warnings: tuple[str, ...]
@@ -117,6 +120,7 @@ class RemeshResult:
             "status": self.status.value,
             "inserted": self.inserted,
             "removed": self.removed,
+            "seed": self.seed,
             "stretch": {"mean": float(of_faces.mean()), "max": float(of_faces.max())},
             "stretch_of_embedding": {"mean": embedded.achieved_mean, "max": embedded.achieved_max},
             "validity": self.validity.as_dict(),

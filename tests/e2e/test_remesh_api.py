@@ -1,11 +1,13 @@
 """The Python interface: what it accepts, what it returns, what it refuses."""
 
+from dataclasses import replace
 from fractions import Fraction
 
 import numpy as np
 import pytest
 
 import anisomesh
+from anisomesh import pipeline
 from anisomesh.errors import MeshError, MetricError, OptionError
 from anisomesh.mesh.distance import surface_distance
 from anisomesh.mesh.surface import Surface
@@ -225,6 +227,26 @@ def test_a_wrong_tensor_is_named_by_the_point_of_the_input():
         anisomesh.remesh(surface, n_vertices=40, metric=tensors)
     with pytest.raises(OptionError, match=r"density\[10\] = 0"):
         anisomesh.remesh(surface, n_vertices=40, density=np.where(np.arange(surface.n_points) == 10, 0.0, 1.0))
+
+
+@pytest.mark.parametrize(
+    ("faults", "intersections", "used"), [([2, 0], 0, 6), ([2, 1, 1], 0, 6), ([2, 3, 1], 0, 7), ([2], 1, 5)]
+)
+def test_other_seeds_are_tried_while_a_mesh_has_faults_that_the_input_does_not_explain(
+    ring, monkeypatch, faults, intersections, used
+):
+    """The best of three is the mesh of its seed, and its stages took the time of all."""
+    check, left = pipeline.check_validity, list(faults)
+
+    def faulty(mesh, reference):
+        return replace(check(mesh, reference), inverted=left.pop(0), self_intersections_input=intersections)
+
+    monkeypatch.setattr(pipeline, "check_validity", faulty)
+    options = {"n_vertices": 60, "embedding": "direct", **FEW}
+    result = anisomesh.remesh(ring, seed=5, **options)
+    assert (left, result.seed, result.report()["seed"]) == ([], used, used)
+    monkeypatch.undo()
+    np.testing.assert_array_equal(result.surface.points, anisomesh.remesh(ring, seed=used, **options).surface.points)
 
 
 def test_numbers_of_any_type_and_no_features_are_accepted(ring):
