@@ -74,8 +74,8 @@ def test_noisy_scan_is_better_with_the_network(tmp_path, capsys):
         [float(word) for word in line.replace("e-4", "").replace(",", "").split() if word.replace(".", "").isdigit()]
         for line in capsys.readouterr().out.splitlines()[:2]
     )
-    assert hybrid[0] > direct[0] + 0.05  # G
-    assert hybrid[1] < 0.8 * direct[1]  # RMS
+    assert hybrid[0] > direct[0]  # G, to two digits
+    assert hybrid[1] < 0.6 * direct[1]  # RMS
 
 
 @pytest.mark.slow

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import numpy.typing as npt
 
@@ -51,13 +53,7 @@ def limit_to_patches(field: MetricField, surface: Surface, n_vertices: int) -> M
     values, vectors = np.linalg.eigh(corners[narrow])
     values[..., 2] = np.maximum(values[..., 1], values[..., 2] * factor[narrow, None] ** 2)
     corners[narrow] = (vectors * values[..., None, :]) @ vectors.swapaxes(-1, -2)
-    return MetricField(
-        tensors=mean_at_points(surface, corners),
-        corner_tensors=corners,
-        patch=field.patch,
-        points=field.points,
-        noise=field.noise,
-    )
+    return replace(field, tensors=mean_at_points(surface, corners), corner_tensors=corners)
 
 
 def _extent(surface: Surface, patch: FaceLabels, direction: FaceVectors) -> FaceScalars:
