@@ -14,7 +14,7 @@ from anisomesh.features.polylines import FeaturePolylines, Floats, Ints
 from anisomesh.mesh.embedded_surface import EmbeddedSurface
 
 _CORNER_SCALE = 0.75  # site spacings over which the turn of a boundary is measured; heuristic
-_MAX_CREASE_LENGTH = 1.2  # site spacings of crease for each site; longer networks leave no sites for the faces
+_MAX_CREASE_LENGTH = 1.6  # site spacings of crease for each site; longer ones leave no sites for the faces; heuristic
 
 
 @dataclass(frozen=True, eq=False)
