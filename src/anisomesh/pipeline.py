@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from anisomesh._arrays import EdgeMask, PointScalars, PointTensors, real_array
+from anisomesh._arrays import EdgeMask
 from anisomesh._values import real_number, whole_number
 from anisomesh.caveats import caveats
 from anisomesh.cvt.lbfgs import Optimised
@@ -21,10 +21,10 @@ from anisomesh.delaunay.creases import missing_on_creases
 from anisomesh.delaunay.dual import dual_squared_errors
 from anisomesh.delaunay.meshing import MeshingTask, ValidMesh, mesh_from_sites
 from anisomesh.embedding.embedder import checked_embedding
-from anisomesh.errors import MetricError, OptionError, TimeLimitError
-from anisomesh.features.detect import sharp_edges
+from anisomesh.errors import OptionError, TimeLimitError
+from anisomesh.features.detect import WEAK_ANGLE, sharp_edges
 from anisomesh.features.network import FeatureNetwork, trace_features
-from anisomesh.features.tagged import tagged_edges
+from anisomesh.inputs import PreparedInput, prepared_input
 from anisomesh.io.convert import as_surface
 from anisomesh.memory import check_memory
 from anisomesh.mesh.embedded_surface import EmbeddedSurface
@@ -34,17 +34,13 @@ from anisomesh.mesh.validity import Validity, check_validity
 from anisomesh.mesh.working_surface import working_surface
 from anisomesh.metric.field import checked_field
 from anisomesh.metric.narrow_patches import limit_to_patches
-from anisomesh.metric.tensors import validate_metric
 from anisomesh.options import RemeshOptions
 from anisomesh.progress import OnStep, StepInfo, ignore_steps
-from anisomesh.repair.prepare import Prepared, prepare
 from anisomesh.resolve import cvt_options, embedder, embedding_name, follows_creases, metric_source
 from anisomesh.result import RemeshResult
 from anisomesh.search import MIN_VERTICES, smallest_within
 from anisomesh.voronoi.restricted import RestrictedVoronoi
 
-WEAK_ANGLE = 20.0  # degrees; edges this sharp stay in the working surface, weak features among them; heuristic
-_LARGEST_DENSITY = 1e30  # and inverse of the smallest, so that energies are far from overflow
 _LARGEST_RATIO = 1e12  # vertices per vertex of the input; more is a mistake
 MAX_STARTS = 3  # of the optimisation, with one seed after the other, for a mesh without faults
 OPTIMISATION_SHARE = 0.6  # of the time limit, for everything up to the end of the optimisation
@@ -110,7 +106,7 @@ def remesh(
     surface = as_surface(mesh, faces)
     n_vertices, ratio, max_error = _read_target(n_vertices, ratio, max_error)
     with run.stage("prepare"):
-        source = _prepared_input(surface, options)
+        source = prepared_input(surface, options)
     prepared = source.prepared.surface
     if max_error is not None:
         options = replace(options, denoise=False)  # the distance asked for refers to the input itself
@@ -124,48 +120,7 @@ def remesh(
     return _remesh(source, n, options, run)
 
 
-@dataclass(frozen=True, kw_only=True, eq=False)
-class _Input:
-    """A prepared surface with everything that belongs to its points and edges.
-
-    Attributes
-    ----------
-    prepared
-        The prepared surface.
-    tensors, density
-        Metric (V, 3, 3) and density (V,) at its points, None if they are not prescribed.
-    tagged
-        Which of its edges (E,) are features in any case.
-    """
-
-    prepared: Prepared
-    tensors: PointTensors | None
-    density: PointScalars | None
-    tagged: EdgeMask
-
-
-def _prepared_input(surface: Surface, options: RemeshOptions) -> _Input:
-    """Return the prepared surface and what the options say of its points and edges."""
-    prepared = prepare(surface, weld_tolerance=options.weld_tolerance)
-    tensors = density = None
-    if not isinstance(options.metric, str) and not callable(options.metric):
-        given = _at_prepared("metric", options.metric, (surface.n_points, 3, 3), prepared, MetricError)
-        tensors = validate_metric(given, prepared.surface, numbers=prepared.point_source)
-    if options.density is not None:
-        density = _at_prepared("density", options.density, (surface.n_points,), prepared, OptionError)
-        invalid = np.flatnonzero(~((density > 1.0 / _LARGEST_DENSITY) & (density < _LARGEST_DENSITY)))
-        if len(invalid):
-            value, where = density[invalid[0]], prepared.point_source[invalid[0]]
-            raise OptionError(
-                f"density[{where}] = {value:g}; expected a positive weight for each point, below {_LARGEST_DENSITY:g}"
-            )
-    tagged = np.zeros(len(prepared.surface.edges), dtype=bool)
-    if options.features is not None:
-        tagged = tagged_edges(surface, options.features, prepared.surface, options.weld_tolerance)
-    return _Input(prepared=prepared, tensors=tensors, density=density, tagged=tagged)
-
-
-def _remesh(source: _Input, n: int, options: RemeshOptions, run: _Run) -> RemeshResult:
+def _remesh(source: PreparedInput, n: int, options: RemeshOptions, run: _Run) -> RemeshResult:
     """Remesh a prepared surface with n vertices."""
     prepared = source.prepared
     with run.stage("prepare"):
@@ -330,10 +285,3 @@ def _read_target(n_vertices: object, ratio: object, max_error: object) -> tuple[
     if not 0.0 < share <= _LARGEST_RATIO:
         raise OptionError(f"ratio = {share}; expected a positive number, such as 0.2 for a fifth of the vertices")
     return None, share, None
-
-
-def _at_prepared(
-    name: str, values: Any, shape: tuple[int, ...], prepared: Prepared, error: type[Exception]
-) -> npt.NDArray[np.float64]:
-    """Return values at the points of the input as values at the prepared points."""
-    return np.asarray(real_array(name, values, shape, error)[prepared.point_source])

@@ -33,7 +33,7 @@ class RemeshResult:
         What the repair did, as counts.
     working
         The surface that was embedded: the prepared input at bounding-box diagonal 1, slivers and long edges
-        triangulated anew, noise removed. Its triangles may be other ones than those of ``prepared``.
+        triangulated anew, noise removed. Its triangles may differ from the triangles of ``prepared``.
     tensors
         The metric at the points of ``working`` (V, 3, 3), at bounding-box diagonal 1.
     corner_tensors

@@ -47,7 +47,7 @@ def refuse(run_cli, tmp_path):
         (["-n", "100", "--rvd", "cells.png"], ".vtu or .obj"),
         (["-n", "100", "--picture", "both.jpg"], ".png"),
         (["-n", "100", "--report", "out.ply"], "same file name"),
-        (["-n", "100", "--report", "missing/report.json"], "there is no folder missing"),
+        (["-n", "100", "--report", "missing/report.json"], "the folder missing does not exist"),
         (["-n", "100", "--shapness", "3"], "--shapness"),
         (["-n", "100", "--threads", "99999999999999999999"], "--threads"),
         (["-n", "100", "--report", "/dev/null"], "not a plain file"),
@@ -114,7 +114,7 @@ def test_a_closed_standard_output_is_no_error(torus_obj):
     assert "Traceback" not in done.stderr
 
 
-@pytest.mark.skipif(not Path("/proc/self").exists(), reason="there is no folder in which nobody can write")
+@pytest.mark.skipif(not Path("/proc/self").exists(), reason="needs a folder that nobody can write")
 def test_a_folder_that_cannot_be_written_is_found_out_before_the_work(refuse, torus_obj):
     assert "cannot be written" in refuse(2, "remesh", torus_obj, "-o", "/proc/out.ply", "-n", 100)
 

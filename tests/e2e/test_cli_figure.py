@@ -189,7 +189,7 @@ def test_from_and_up_turn_the_camera(figure):
         (["result", "fine.obj", "coarse.obj", "--cells"], 2, "--cells"),
         (["result", "fine.obj", "coarse.obj", "--colour", "pink"], 2, "--colour"),
         (["result", "fine.obj", "coarse.obj", "-o", "out.jpg"], 2, ".png or .pdf"),
-        (["result", "fine.obj", "coarse.obj", "-o", "missing/out.png"], 2, "no folder missing"),
+        (["result", "fine.obj", "coarse.obj", "-o", "missing/out.png"], 2, "the folder missing does not exist"),
         (["result", "fine.obj", "coarse.obj", "--from", "0", "0", "0"], 2, "--from"),
         (["result", "missing.obj", "coarse.obj"], 1, "missing.obj"),
         (["result", "fine.obj", "missing.obj"], 1, "missing.obj"),

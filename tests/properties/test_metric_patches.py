@@ -86,7 +86,7 @@ def test_a_box_has_six_patches_and_a_smooth_surface_is_the_same_object():
 
 @pytest.mark.parametrize("noise", [0.15, 0.3, 0.5])
 def test_a_rough_scan_is_not_cut_to_pieces(noise):
-    """Up to three quarters of its edges are sharp, but they are no creases."""
+    """Up to three quarters of its edges are sharp, but without forming creases."""
     ball = sphere(4)
     rough = ball.with_points(
         ball.points + noise * ball.edge_lengths.mean() * np.random.default_rng(0).normal(size=ball.points.shape)

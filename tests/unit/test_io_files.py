@@ -248,7 +248,7 @@ def test_failed_write_keeps_the_old_file_and_leaves_no_trace(tmp_path, monkeypat
 
 
 def test_impossible_targets_are_refused(tmp_path):
-    with pytest.raises(MeshFileError, match="there is no folder"):
+    with pytest.raises(MeshFileError, match="does not exist; create it first"):
         save(BOX, tmp_path / "none" / "a.obj")
     with pytest.raises(MeshFileError, match="unknown format"):
         save(BOX, tmp_path / "a.docx")

@@ -27,7 +27,7 @@ Up = Annotated[AxisName | None, typer.Option("--up", help="Axis that points up; 
 
 
 def check_figure_path(out: Path, *inputs: Path | None) -> None:
-    """Check before any work that a figure can be drawn on this machine and written to a file that is no input.
+    """Check before any work that a figure can be drawn on this machine and written without replacing an input.
 
     Raises
     ------

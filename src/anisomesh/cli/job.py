@@ -97,7 +97,7 @@ def check_output_path(path: Path) -> None:
             raise typer.BadParameter(f"{path} is not a plain file; give another name")
         if not target.parent.is_dir():
             folder = path.parent if target.parent == path.parent.resolve() else target.parent
-            raise typer.BadParameter(f"{path}: there is no folder {folder}; create it first")
+            raise typer.BadParameter(f"{path}: the folder {folder} does not exist; create it first")
         with tempfile.NamedTemporaryFile(dir=target.parent, prefix="."):
             pass
     except (OSError, RuntimeError, UnicodeError) as error:  # RuntimeError: a loop of links, before Python 3.13

@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 
 from anisomesh._arrays import FaceScalars
-from anisomesh.features.detect import sharp_edges
+from anisomesh.features.detect import WEAK_ANGLE, sharp_edges
 from anisomesh.mesh.closest_points import ClosestPoints
 from anisomesh.mesh.geometry import corner_angles
 from anisomesh.mesh.surface import Surface
@@ -19,7 +19,6 @@ from anisomesh.metric.transfer import transfer_to_corners
 
 _MIN_QUALITY = 0.7  # of the triangles of a reference, below which they are slivers; heuristic
 _EVEN_VERTICES = 5_000  # of the even mesh with which they are replaced
-_WEAK_ANGLE = 20.0  # degrees; edges of the reference that are sharper stay in place; heuristic
 _LOW_QUANTILE = 0.05  # of g_low and angle_low; a convention of this report
 
 
@@ -79,7 +78,7 @@ def quality_in_reference_metric(reference: Surface, surface: Surface) -> FaceSca
     identity = np.broadcast_to(np.eye(3), (reference.n_points, 3, 3))
     euclidean = anisotropic_quality(reference.points, reference.faces, identity)
     if (euclidean * reference.face_areas).sum() < _MIN_QUALITY * reference.area:
-        creases = sharp_edges(reference, _WEAK_ANGLE)
+        creases = sharp_edges(reference, WEAK_ANGLE)
         reference = working_surface(reference, _EVEN_VERTICES, creases=creases, tagged=np.zeros_like(creases)).surface
     roots = transfer_to_corners(ClosestPoints(reference), Curvature()(reference), surface)
     return anisotropic_quality(surface.points, surface.faces, roots)

@@ -8,6 +8,8 @@ from anisomesh._arrays import EdgeMask, PointMask, Points
 from anisomesh.mesh import geometry
 from anisomesh.mesh.surface import Surface
 
+WEAK_ANGLE = 20.0  # degrees; edges this sharp stay when slivers are triangulated anew; heuristic
+
 _MAX_FLAT_ANGLE = 1e-3  # sine of the angle between face normals at a flat edge; above the rounding of files, heuristic
 _MIN_CORNER_TURN = 45.0  # degrees between the two sharp edges at a corner; heuristic
 

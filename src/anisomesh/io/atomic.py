@@ -37,7 +37,7 @@ def atomic_path(path: str | os.PathLike[str]) -> Iterator[Path]:
     except (OSError, RuntimeError) as error:  # RuntimeError before Python 3.13
         raise MeshFileError(f"{path}: cannot be written: {error}") from error
     if not target.parent.is_dir():
-        raise MeshFileError(f"{path}: cannot be written: there is no folder {target.parent}; create it first")
+        raise MeshFileError(f"{path}: cannot be written: the folder {target.parent} does not exist; create it first")
     if is_other:
         raise MeshFileError(f"{path}: cannot be written: it exists and is not a plain file; choose another name")
     temporary = target.with_name(f".{target.stem[:80]}.{secrets.token_hex(4)}{target.suffix}")

@@ -24,8 +24,8 @@ class SmoothPatches:
     whole
         The surface.
     surface
-        The same faces, with a point of its own (V',) for each fan of faces between creases; the surface itself if there
-        is no crease.
+        The same faces, with a point of its own (V',) for each fan of faces between creases; the surface itself without
+        creases.
     source
         Point of the whole surface for each of these points (V',).
     """
