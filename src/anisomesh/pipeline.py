@@ -34,6 +34,7 @@ from anisomesh.mesh.validity import Validity, check_validity
 from anisomesh.mesh.working_surface import working_surface
 from anisomesh.metric.field import checked_field
 from anisomesh.metric.narrow_patches import limit_to_patches
+from anisomesh.metric.thin_walls import separate_thin_walls
 from anisomesh.options import RemeshOptions
 from anisomesh.progress import OnStep, StepInfo, ignore_steps
 from anisomesh.resolve import cvt_options, embedder, embedding_name, follows_creases, metric_source
@@ -138,7 +139,8 @@ def _remesh(source: PreparedInput, n: int, options: RemeshOptions, run: _Run) ->
             surface = surface.with_points(field.points[: surface.n_points])
         field = limit_to_patches(field, working, n)
     with run.stage("embed"):
-        embedding = checked_embedding(embedder(options)(working, field), working)
+        apart = separate_thin_walls(field, working, n, options.feature_angle) if follows_creases(options) else field
+        embedding = checked_embedding(embedder(options)(working, apart), working)
         density = None if source.density is None else split.interpolate(source.density)
         embedded = EmbeddedSurface(working, embedding.points, embedding.scale, density)
         task = MeshingTask(

@@ -62,6 +62,18 @@ def test_a_triangle_on_two_sheets_that_lie_on_each_other_faces_one_of_them():
     assert closest.inverted(outside[:, ::-1]).all()
 
 
+@pytest.mark.parametrize("thickness", [1e-2, 1e-4, 1e-6])
+def test_a_large_triangle_on_the_face_of_a_thin_plate_faces_it_clearly(thickness):
+    """Regression: a hundredth of its size below it was the other face, so no vertex of a plate could be removed."""
+    closest = ClosestPoints(box((1.0, 1.0, thickness), n=1))
+    triangle = np.array([[0.05, 0.1, 0.0], [0.95, 0.15, 0.0], [0.4, 0.9, 0.0]])
+    up = np.array([0.0, 0.0, thickness])
+    assert closest.clearly_facing(np.stack([triangle + up, triangle[::-1]])).all()
+    assert not closest.clearly_facing(np.stack([triangle[::-1] + up, triangle])).any()
+    halfway = np.stack([triangle, triangle[::-1]]) + 0.5 * up
+    assert not closest.clearly_facing(halfway).any()
+
+
 @pytest.mark.parametrize("seed", range(8))
 def test_no_triangle_is_inverted_against_a_fold_or_at_a_right_angle(seed):
     """Regression: the sum of opposite normals is rounding, and so is the product of normals at a right angle."""

@@ -24,6 +24,7 @@ _FLAT_SQUARED_RATIO = 1e-20  # (2 area / longest side^2)^2 up to which a triangl
 
 Vectors = npt.NDArray[np.float64]  # (n, 3)
 Facets = npt.NDArray[np.int64]  # (n,), face indices
+Cosines = npt.NDArray[np.float64]  # (n,)
 
 
 class ClosestPoints:
@@ -86,16 +87,32 @@ class ClosestPoints:
 
         The normals must agree at the points closest to the barycentre and to two points slightly above and below it.
         Halfway between the two sides of a thin part, or in a concave corner, rounding alone would decide whether a
-        triangle is inverted; such a triangle does not face the surface clearly.
+        triangle is inverted; such a triangle does not face the surface clearly. Slightly is a hundredth of the
+        triangle's size, or the distance of the barycentre from the surface if that is less: on the face of a plate
+        thinner than a hundredth of the triangle nothing is in doubt.
         """
         normals = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
         centre = corners.mean(axis=1)
-        offset = _NORMAL_OFFSET * unit(normals) * np.sqrt(np.linalg.norm(normals, axis=1, keepdims=True))
-        queries = np.concatenate([centre, centre + offset, centre - offset])
-        cosines = self._cosines(np.tile(normals, (3, 1)), queries).reshape(3, -1)
-        return np.asarray(cosines.min(axis=0) > _MIN_AGREEMENT_COSINE)
+        offset = _NORMAL_OFFSET * np.sqrt(np.linalg.norm(normals, axis=1))
+        at_centre = self._cosines(normals, centre)
+        lowest = np.minimum(at_centre, self._lowest_cosines(normals, centre, offset))
+        doubtful = np.flatnonzero((at_centre > _MIN_AGREEMENT_COSINE) & (lowest <= _MIN_AGREEMENT_COSINE))
+        distance = np.sqrt(self.squared_distances(centre[doubtful]))
+        nearer = np.maximum(distance, _COINCIDENT_DISTANCE * self.surface.diagonal)
+        lowest[doubtful] = np.where(
+            nearer < offset[doubtful],
+            self._lowest_cosines(normals[doubtful], centre[doubtful], nearer),
+            lowest[doubtful],
+        )
+        return np.asarray(lowest > _MIN_AGREEMENT_COSINE)
 
-    def _cosines(self, normals: Vectors, queries: Vectors) -> npt.NDArray[np.float64]:
+    def _lowest_cosines(self, normals: Vectors, centre: Vectors, offset: npt.NDArray[np.float64]) -> Cosines:
+        """Return the lower of the cosines (n,) at an offset (n,) above and below the barycentre of each triangle."""
+        step = offset[:, None] * unit(normals)
+        cosines = self._cosines(np.tile(normals, (2, 1)), np.concatenate([centre + step, centre - step]))
+        return np.asarray(cosines.reshape(2, -1).min(axis=0))
+
+    def _cosines(self, normals: Vectors, queries: Vectors) -> Cosines:
         """Return the cosine (n,) between normals (n, 3) of any length and the pseudonormals closest to the queries.
 
         Where an opposite facet coincides with the closest one, return the larger cosine.

@@ -126,7 +126,7 @@ class EmbeddedSurface:
 
     def site_spacing(self, n_sites: int) -> float:
         """Return the edge length of n sites in equilateral triangles that cover the embedded surface evenly."""
-        return float(np.sqrt(2.0 * self.area / (np.sqrt(3.0) * n_sites)))
+        return geometry.even_edge_length(self.area, n_sites)
 
     def at(self, faces: npt.NDArray[np.integer], barycentric: npt.NDArray[np.float64]) -> EmbeddedPoints:
         """Return the embedded positions (n, d) of points given by face (n,) and barycentric coordinates (n, 3)."""

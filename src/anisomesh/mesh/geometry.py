@@ -92,3 +92,8 @@ def unit_frame(points: Points) -> Frame:
     """Return the frame in which points (V, 3) have bounding-box diagonal 1 and centre 0."""
     low, high = points.min(axis=0), points.max(axis=0)
     return Frame(centre=0.5 * (low + high), scale=float(np.linalg.norm(high - low)) or 1.0)
+
+
+def even_edge_length(area: float, n_vertices: int) -> float:
+    """Return the edge length of a mesh of equilateral triangles with this area and number of vertices."""
+    return float(np.sqrt(2.0 * area / (np.sqrt(3.0) * n_vertices)))

@@ -13,6 +13,7 @@ import numpy.typing as npt
 
 from anisomesh._arrays import EdgeMask
 from anisomesh.mesh.delaunay_refinement import Refinement, refine_slivers
+from anisomesh.mesh.geometry import even_edge_length
 from anisomesh.mesh.subdivision import Subdivision, edges_within, split_long_edges
 from anisomesh.mesh.surface import Surface
 
@@ -62,7 +63,7 @@ def working_surface(surface: Surface, n_vertices: int, *, creases: EdgeMask, tag
     creases, tagged
         Edges (E,) that stay in place; tagged ones are found again in the result.
     """
-    site_distance, metric_edge = (_even_edge_length(surface.area, n) for n in (n_vertices, _METRIC_VERTICES))
+    site_distance, metric_edge = (even_edge_length(surface.area, n) for n in (n_vertices, _METRIC_VERTICES))
     max_length = min(_MAX_EDGE_PER_SITE_DISTANCE * site_distance, _MAX_EDGE_PER_METRIC_EDGE * metric_edge)
     max_faces = max(_MAX_FACE_GROWTH * surface.n_faces, _MIN_FACE_LIMIT)
     refinement = refine_slivers(
@@ -81,8 +82,3 @@ def working_surface(surface: Surface, n_vertices: int, *, creases: EdgeMask, tag
         _refinement=refinement,
         _subdivision=subdivision,
     )
-
-
-def _even_edge_length(area: float, n_vertices: int) -> float:
-    """Return the edge length of a mesh of equilateral triangles with this area and number of vertices."""
-    return float(np.sqrt(2.0 * area / (np.sqrt(3.0) * n_vertices)))

@@ -8,7 +8,7 @@ import numpy as np
 import numpy.typing as npt
 
 from anisomesh._arrays import FaceLabels, FaceScalars, FaceVectors
-from anisomesh.mesh.geometry import unit
+from anisomesh.mesh.geometry import even_edge_length, unit
 from anisomesh.mesh.surface import Surface
 from anisomesh.metric.field import MetricField, mean_at_points
 
@@ -44,7 +44,7 @@ def limit_to_patches(field: MetricField, surface: Surface, n_vertices: int) -> M
     for _ in range(_ROUNDS):
         large = np.maximum(values[:, 1], values[:, 2] * factor**2)
         area = float((surface.face_areas * np.sqrt(values[:, 1] * large)).sum())
-        spacing = np.sqrt(2.0 * area / (np.sqrt(3.0) * n_vertices))
+        spacing = even_edge_length(area, n_vertices)
         factor = np.minimum(1.0, length / spacing)
     narrow = factor < 1.0
     if not narrow.any():

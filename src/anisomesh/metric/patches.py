@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 import numpy.typing as npt
 
-from anisomesh._arrays import EdgeMask, PointLabels, PointTensors
+from anisomesh._arrays import EdgeMask, FaceLabels, PointLabels, PointTensors
 from anisomesh.features.creases import select_creases
 from anisomesh.features.detect import sharp_edges
 from anisomesh.mesh.surface import Surface
@@ -34,13 +34,17 @@ class SmoothPatches:
     surface: Surface
     source: PointLabels
 
+    @property
+    def labels(self) -> FaceLabels:
+        """Number of the patch of each face (F,)."""
+        return connected_components(self.surface.faces, self.surface.n_points)[1]
+
     def field(self, tensors: PointTensors) -> MetricField:
         """Return tensors (V', 3, 3) on the patches as a metric field of the whole surface, averaged at its points."""
         if self.surface is self.whole:
             return MetricField(tensors=tensors)
         corners = tensors[self.surface.faces]
-        _, patch = connected_components(self.surface.faces, self.surface.n_points)
-        return MetricField(tensors=mean_at_points(self.whole, corners), corner_tensors=corners, patch=patch)
+        return MetricField(tensors=mean_at_points(self.whole, corners), corner_tensors=corners, patch=self.labels)
 
 
 def smooth_patches(surface: Surface, crease_angle: float, neighbourhood: int) -> SmoothPatches:
