@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from anisomesh._arrays import EdgeMask
+from anisomesh._arrays import EdgeMask, PointMask
 from anisomesh._values import real_number, whole_number
 from anisomesh.caveats import caveats
 from anisomesh.cvt.lbfgs import Optimised
@@ -22,7 +22,7 @@ from anisomesh.delaunay.dual import dual_squared_errors
 from anisomesh.delaunay.meshing import MeshingTask, ValidMesh, mesh_from_sites
 from anisomesh.embedding.embedder import checked_embedding
 from anisomesh.errors import OptionError, TimeLimitError
-from anisomesh.features.detect import WEAK_ANGLE, sharp_edges
+from anisomesh.features.detect import WEAK_ANGLE, apexes, sharp_edges
 from anisomesh.features.network import FeatureNetwork, trace_features
 from anisomesh.inputs import PreparedInput, prepared_input
 from anisomesh.io.convert import as_surface
@@ -128,6 +128,7 @@ def _remesh(source: PreparedInput, n: int, options: RemeshOptions, run: _Run) ->
         frame = unit_frame(prepared.surface.points)
         surface = prepared.surface.with_points(frame.to_unit(prepared.surface.points))
         creases = sharp_edges(surface, min(options.feature_angle, WEAK_ANGLE))
+        tips = apexes(surface, sharp_edges(surface, options.feature_angle))
         split = working_surface(surface, n, creases=creases, tagged=source.tagged)
         check_memory(n, split.surface.n_faces)
     with run.stage("metric"):
@@ -145,7 +146,7 @@ def _remesh(source: PreparedInput, n: int, options: RemeshOptions, run: _Run) ->
         embedded = EmbeddedSurface(working, embedding.points, embedding.scale, density)
         task = MeshingTask(
             voronoi=RestrictedVoronoi(embedded, threads=options.threads),
-            features=_features(embedded, n, split.tagged, options),
+            features=_features(embedded, n, split.tagged, tips, options),
             surface=surface,
             tensors=field.tensors,
             n_vertices=n,
@@ -226,14 +227,17 @@ def _mesh_of_start(task: MeshingTask, options: RemeshOptions, run: _Run) -> _Mad
     return _Made(mesh=mesh, optimised=optimised, validity=validity, seed=options.seed)
 
 
-def _features(embedded: EmbeddedSurface, n: int, tagged: EdgeMask, options: RemeshOptions) -> FeatureNetwork:
-    """Return boundary and creases; with the plain CVT only the tagged edges are creases.
+def _features(
+    embedded: EmbeddedSurface, n: int, tagged: EdgeMask, tips: PointMask, options: RemeshOptions
+) -> FeatureNetwork:
+    """Return boundary, creases and apexes; with the plain CVT only the tagged edges.
 
-    ``tagged`` are edges (E,) of the embedded surface.
+    ``tagged`` are edges (E,) of the embedded surface, and ``tips`` the apexes among the points of the input (V,).
     """
     angle = options.feature_angle if follows_creases(options) else 180.0
     sharp = sharp_edges(embedded.surface, angle) | tagged
-    return trace_features(embedded, n, sharp=sharp, required=tagged)
+    apex = np.flatnonzero(tips & follows_creases(options))
+    return trace_features(embedded, n, sharp=sharp, required=tagged, apexes=apex)
 
 
 class _Run:

@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 from creases import wedge
 
+import anisomesh
 from anisomesh.cvt.constraints import ConstrainedSites
 from anisomesh.cvt.energy import NormalMetric
 from anisomesh.cvt.relocation import relocate_to_missed_points
@@ -15,11 +16,12 @@ from anisomesh.delaunay.placement import (
     project_to_main_planes,
     snap_to_missed_corners,
 )
-from anisomesh.features.detect import corners, sharp_edges
+from anisomesh.features.detect import apexes, corners, sharp_edges
+from anisomesh.features.network import trace_features
 from anisomesh.mesh.closest_points import ClosestPoints
 from anisomesh.mesh.embedded_surface import EmbeddedSurface
 from anisomesh.mesh.surface import Surface
-from anisomesh.shapes.analytic import box
+from anisomesh.shapes.analytic import box, sphere, torus
 from anisomesh.voronoi.cells import cell_complex
 from anisomesh.voronoi.restricted import RestrictedVoronoi
 
@@ -93,7 +95,8 @@ def test_snapping_moves_vertices_onto_missed_corners():
     sharp = sharp_edges(surface, 45.0)
     ends = surface.points[corners(surface, sharp)]
     before = np.sqrt(ClosestPoints(Surface(points, faces)).squared_distances(ends))
-    snapped = snap_to_missed_corners(cells, points, faces, sharp, np.ones(cells.n_components, dtype=bool))
+    features = trace_features(cells.embedded, 200, sharp=sharp)
+    snapped = snap_to_missed_corners(cells, points, faces, features, np.ones(cells.n_components, dtype=bool))
     after = np.sqrt(ClosestPoints(Surface(snapped, faces)).squared_distances(ends))
     assert before.max() > 0.01
     assert (after < 1e-9).sum() > (before < 1e-9).sum()
@@ -115,3 +118,32 @@ def test_relocation_puts_a_site_on_a_missed_corner():
     assert np.linalg.norm(changed - corner, axis=1).min() == 0.0
     kept = (changed[:, None] == sites[None]).all(axis=2).any(axis=1)
     assert kept.mean() >= 0.95
+
+
+def cone(sections, height):
+    angle = 2.0 * np.pi * np.arange(sections) / sections
+    rim = np.stack([np.cos(angle), np.sin(angle), 0.0 * angle], axis=1)
+    k, after = np.arange(sections), np.roll(np.arange(sections), -1)
+    centre, apex = np.full(sections, sections), np.full(sections, sections + 1)
+    faces = np.concatenate([np.stack([after, k, centre], axis=1), np.stack([k, after, apex], axis=1)])
+    return Surface(np.concatenate([rim, [[0.0, 0.0, 0.0], [0.0, 0.0, height]]]), faces.astype(np.int32))
+
+
+@pytest.mark.parametrize("sections", [16, 20, 64, 512])
+@pytest.mark.parametrize("height", [0.4, 2.0, 8.0])
+def test_the_apex_of_a_cone_is_found_and_is_a_vertex(sections, height):
+    """Regression: the apex was cut off by .2 to .9 % of the diagonal."""
+    surface = cone(sections, height)
+    defect = 360.0 * (1.0 - 1.0 / np.sqrt(1.0 + height**2))
+    found = np.flatnonzero(apexes(surface, sharp_edges(surface, 40.0)))
+    assert found.tolist() == ([sections + 1] if defect > 20.5 else [])
+    result = anisomesh.remesh(surface, n_vertices=100, embedding="direct", max_iterations=30)
+    distance = np.linalg.norm(result.surface.points - surface.points[-1], axis=1).min()
+    assert distance < 1e-12
+
+
+@pytest.mark.parametrize("surface", [sphere(), torus(1.0, 0.4, 40, 20), box(), sphere(subdivisions=0)])
+def test_smooth_rough_and_angular_surfaces_have_no_apex(surface):
+    rough = surface.with_points(surface.points + 0.01 * np.random.default_rng(0).normal(size=surface.points.shape))
+    for case in (surface, rough):
+        assert not apexes(case, sharp_edges(case, 40.0)).any()

@@ -66,7 +66,7 @@ def place_vertices(
     size = np.linalg.norm(offset, axis=1)
     space[creased.cell[curved]] += np.where((size < limit)[:, None], offset, 0.0)
     fixed[creased.cell] = True
-    return snap_to_missed_corners(cells, space, faces, features.sharp, ~fixed[: cells.n_components])
+    return snap_to_missed_corners(cells, space, faces, features, ~fixed[: cells.n_components])
 
 
 def cells_with_crease(cells: CellComplex, sharp: EdgeMask) -> Ints:
@@ -132,7 +132,7 @@ def project_to_main_planes(cells: CellComplex, chosen: Ints, points: Points) -> 
 
 
 def snap_to_missed_corners(
-    cells: CellComplex, points: Points, faces: Faces, sharp: EdgeMask, movable: PointMask
+    cells: CellComplex, points: Points, faces: Faces, features: FeatureNetwork, movable: PointMask
 ) -> Points:
     """Return the vertices (V, 3), some of them moved to corners of the surface that the mesh misses.
 
@@ -142,8 +142,8 @@ def snap_to_missed_corners(
         The cell components, which are the first vertices.
     points, faces
         The dual in space (V, 3), (F, 3).
-    sharp
-        Which edges of the surface (E,) are creases.
+    features
+        Creases and apexes of the surface.
     movable
         Components whose vertex may move (C,).
 
@@ -151,14 +151,18 @@ def snap_to_missed_corners(
     -----
     Where a cell contains little more than the tip of a corner, the planes there weigh next to nothing, and the corner
     is cut off by a tenth of an edge or more. The vertex of a cell moves to the corner in it that the mesh is farthest
-    from, and back if that increases the distance to the mesh in the cells around.
+    from, and back if that increases the distance to the mesh in the cells around. The apex of a cone is such a corner
+    in any case, even where little is cut off, and the vertex stays there.
     """
     surface = cells.embedded.surface
     owner = _owners(cells)
     mesh = Surface(points, faces)
     missed = (_MISSED_CORNER * float(mesh.edge_lengths.mean())) ** 2
     squared = ClosestPoints(mesh).squared_distances(surface.points)
-    candidate = np.flatnonzero(corners(surface, sharp) & (owner >= 0) & movable[owner] & (squared > missed))
+    apex = np.zeros(surface.n_points, dtype=bool)
+    apex[features.apexes] = True
+    far = (corners(surface, features.sharp) & (squared > missed)) | (apex & (squared > 0.0))
+    candidate = np.flatnonzero(far & (owner >= 0) & movable[owner])
     candidate = candidate[np.argsort(squared[candidate], kind="stable")[::-1]]
     vertex, farthest = first_of_each(owner, candidate)
     moved = np.array(points)
@@ -169,6 +173,7 @@ def snap_to_missed_corners(
     for corner in range(3):
         np.add.at(around, faces[:, corner], change[faces].sum(axis=1))
     worse = around > 0.0
+    worse[vertex[apex[farthest]]] = False
     moved[worse] = points[worse]
     return moved
 

@@ -35,6 +35,8 @@ class FeatureNetwork:
         All edges of the surface on a crease (E,), followed or not.
     required
         Edges that are followed in any case (E,).
+    apexes
+        Points of the surface (n,) at which there is a vertex in any case.
     """
 
     boundary: BoundaryLoops
@@ -44,6 +46,7 @@ class FeatureNetwork:
     spacing: float
     sharp: EdgeMask
     required: EdgeMask
+    apexes: Ints
 
     @property
     def any(self) -> bool:
@@ -52,7 +55,12 @@ class FeatureNetwork:
 
 
 def trace_features(
-    embedded: EmbeddedSurface, n_sites: int, *, sharp: EdgeMask, required: EdgeMask | None = None
+    embedded: EmbeddedSurface,
+    n_sites: int,
+    *,
+    sharp: EdgeMask,
+    required: EdgeMask | None = None,
+    apexes: Ints | None = None,
 ) -> FeatureNetwork:
     """Return the feature network of an embedded surface for a number of sites.
 
@@ -66,6 +74,8 @@ def trace_features(
         Which edges of the surface (E,) are on a crease.
     required
         Which of these (E,) are followed in any case; none by default.
+    apexes
+        Points of the surface (n,) at which there is a vertex in any case; none by default.
 
     Raises
     ------
@@ -84,4 +94,6 @@ def trace_features(
     creases = select_creases(
         positions, surface, sharp, required=required, spacing=spacing, max_length=_MAX_CREASE_LENGTH * n_sites
     )
-    return FeatureNetwork(boundary, corners, turns, creases, spacing, sharp, required)
+    if apexes is None:
+        apexes = np.zeros(0, dtype=np.int64)
+    return FeatureNetwork(boundary, corners, turns, creases, spacing, sharp, required, apexes)
