@@ -128,8 +128,8 @@ def _remesh(source: PreparedInput, n: int, options: RemeshOptions, run: _Run) ->
         frame = unit_frame(prepared.surface.points)
         surface = prepared.surface.with_points(frame.to_unit(prepared.surface.points))
         creases = sharp_edges(surface, min(options.feature_angle, WEAK_ANGLE))
-        tips = apexes(surface, sharp_edges(surface, options.feature_angle))
         split = working_surface(surface, n, creases=creases, tagged=source.tagged)
+        tips = apexes(split.coarse, sharp_edges(split.coarse, options.feature_angle))
         check_memory(n, split.surface.n_faces)
     with run.stage("metric"):
         tensors = None if source.tensors is None else split.interpolate(source.tensors * frame.scale**2)
@@ -137,7 +137,7 @@ def _remesh(source: PreparedInput, n: int, options: RemeshOptions, run: _Run) ->
         working = split.surface
         if field.points is not None:
             working = working.with_points(field.points)
-            surface = surface.with_points(field.points[: surface.n_points])
+            surface = split.coarse.with_points(field.points[: split.coarse.n_points])
         field = limit_to_patches(field, working, n)
     with run.stage("embed"):
         apart = separate_thin_walls(field, working, n, options.feature_angle) if follows_creases(options) else field
@@ -232,7 +232,7 @@ def _features(
 ) -> FeatureNetwork:
     """Return boundary, creases and apexes; with the plain CVT only the tagged edges.
 
-    ``tagged`` are edges (E,) of the embedded surface, and ``tips`` the apexes among the points of the input (V,).
+    ``tagged`` are edges (E,) of the embedded surface, and ``tips`` the apexes among its first points.
     """
     angle = options.feature_angle if follows_creases(options) else 180.0
     sharp = sharp_edges(embedded.surface, angle) | tagged

@@ -11,6 +11,7 @@ from anisomesh.mesh import topology
 from anisomesh.mesh.closest_points import ClosestPoints
 from anisomesh.mesh.delaunay_refinement import refine_slivers
 from anisomesh.mesh.geometry import corner_angles, thickness
+from anisomesh.mesh.marked_surface import MarkedSurface
 from anisomesh.mesh.surface import Surface
 from anisomesh.mesh.working_surface import working_surface
 from anisomesh.shapes import analytic as shapes
@@ -21,9 +22,8 @@ ASPECT = 4.0
 
 def refine(surface, labels=None, *, min_length=0.05, tolerance=1e-9, max_faces=50_000):
     labels = np.zeros(len(surface.edges), dtype=np.int32) if labels is None else labels
-    return refine_slivers(
-        surface, labels, max_aspect=ASPECT, min_length=min_length, tolerance=tolerance, max_faces=max_faces
-    )
+    start = MarkedSurface.unmoved(surface, labels)
+    return refine_slivers(start, max_aspect=ASPECT, min_length=min_length, tolerance=tolerance, max_faces=max_faces)
 
 
 def slivers(surface, min_length):
@@ -82,7 +82,7 @@ def test_marked_edges_stay_in_pieces_with_their_labels():
     refined = refine(flat, labels, tolerance=0.01 * flat.diagonal, min_length=0.02)
     assert refined.surface.n_faces > flat.n_faces
     for label in (1, 2):
-        kept = refined.labels == label
+        kept = refined.marked.labels == label
         length = flat.edge_lengths[labels == label].sum()
         assert refined.surface.edge_lengths[kept].sum() == pytest.approx(length, rel=1e-12)
         ends = flat.points[flat.edges[labels == label]]

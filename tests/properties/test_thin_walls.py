@@ -106,6 +106,20 @@ def test_without_thin_walls_the_metric_stays_as_it_is(shape, n):
     assert apart is field
 
 
+def test_a_closed_smooth_component_beside_a_thin_plate_stays_as_it_is():
+    """Regression: the infinite width of a patch without a rim was multiplied by zero."""
+    ball, sheet = sphere(), plate(1e-3)
+    both = Surface(
+        np.concatenate([ball.points + 3.0, sheet.points]), np.concatenate([ball.faces, sheet.faces + ball.n_points])
+    )
+    surface = even(both, 400)
+    with np.errstate(all="raise", under="ignore"):
+        field, apart = separated(surface, 400)
+    on_ball = surface.points[surface.faces][:, :, 2].min(axis=1) > surface.points[:, 2].mean()
+    assert apart is not field
+    np.testing.assert_array_equal(apart.corner_tensors[on_ball], field.corner_tensors[on_ball])
+
+
 def test_a_wall_is_thin_for_few_vertices_only():
     surface = at_unit_size(box((1.0, 1.0, 0.05), n=20))
     assert separated(surface, 200)[1] is not separated(surface, 200)[0]

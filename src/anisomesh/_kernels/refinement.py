@@ -1,104 +1,22 @@
 """Delaunay refinement of a triangle mesh: flips of edges within a tolerance, and splits of longest edges.
 
-The mesh is a :class:`Triangulation`, whose arrays have room for the faces and points that are added at their ends.
-Side i of a face is opposite its corner i.
+The arrays of the :class:`~anisomesh._kernels.triangulation.Triangulation` have room for the faces and points that are
+added at their ends.
 """
 
-from math import sqrt
-from typing import Any, NamedTuple
-
-from .compiled import inlined, kernel
+from .compiled import kernel
+from .triangulation import cross, difference, dot, length, replace_neighbour, side_towards, write_face
 
 _MIN_NORMAL_COSINE = 0.8  # between the normal of a new triangle and the area vector of the two; heuristic
 _DELAUNAY_MARGIN = 1e-9  # sine of the sum of the opposite angles that counts as zero, above rounding
 _LONGER = 1.0 + 1e-9  # ratio of squared lengths from which a side is longer: of equal sides, the path ends at the first
 
 
-class Triangulation(NamedTuple):
-    """A manifold triangle mesh that kernels change: faces, what is across their sides, and points.
-
-    Attributes
-    ----------
-    points, faces
-        Coordinates (n, 3) and corners (m, 3).
-    neighbours
-        The face across each side (m, 3), -1 at the boundary.
-    labels
-        A number for each side (m, 3), the same from both faces; sides of another number than 0 are not flipped.
-    parents
-        For points that are the middle of an edge, its ends (n, 2).
-    deviation
-        Bound on the distance of each face (m,) from the surface before all flips.
-    stack
-        Workspace (m,) for faces.
-    """
-
-    points: Any
-    faces: Any
-    neighbours: Any
-    labels: Any
-    parents: Any
-    deviation: Any
-    stack: Any
-
-
-@inlined
-def _difference(points, p, q):
-    """Return the vector from point q to point p."""
-    return points[p, 0] - points[q, 0], points[p, 1] - points[q, 1], points[p, 2] - points[q, 2]
-
-
-@inlined
-def _cross(u, v):
-    return u[1] * v[2] - u[2] * v[1], u[2] * v[0] - u[0] * v[2], u[0] * v[1] - u[1] * v[0]
-
-
-@inlined
-def _dot(u, v):
-    return u[0] * v[0] + u[1] * v[1] + u[2] * v[2]
-
-
-@inlined
-def _length(u):
-    return sqrt(_dot(u, u))
-
-
-@inlined
-def _write_row(table, row, values):
-    table[row, 0] = values[0]
-    table[row, 1] = values[1]
-    table[row, 2] = values[2]
-
-
-@inlined
-def _write_face(mesh, face, corners, neighbours, labels):
-    """Set the corners of a face, and neighbours and labels of the sides opposite them."""
-    _write_row(mesh.faces, face, corners)
-    _write_row(mesh.neighbours, face, neighbours)
-    _write_row(mesh.labels, face, labels)
-
-
-@kernel
-def _side_towards(mesh, face, neighbour):
-    """Return the side of a face across which a neighbour is."""
-    for side in range(3):
-        if mesh.neighbours[face, side] == neighbour:
-            return side
-    return -1
-
-
-@kernel
-def _replace_neighbour(mesh, face, old, new):
-    """Make a face the neighbour of another one in place of the old one; -1 is no face."""
-    if face >= 0:
-        mesh.neighbours[face, _side_towards(mesh, face, old)] = new
-
-
 @kernel
 def _area(mesh, face):
     """Return the area of a face."""
     a, b, c = mesh.faces[face, 0], mesh.faces[face, 1], mesh.faces[face, 2]
-    return 0.5 * _length(_cross(_difference(mesh.points, b, a), _difference(mesh.points, c, a)))
+    return 0.5 * length(cross(difference(mesh.points, b, a), difference(mesh.points, c, a)))
 
 
 @kernel
@@ -107,8 +25,8 @@ def _longest_side(mesh, face):
     longest = -1.0
     side = 0
     for i in range(3):
-        along = _difference(mesh.points, mesh.faces[face, (i + 2) % 3], mesh.faces[face, (i + 1) % 3])
-        square = _dot(along, along)
+        along = difference(mesh.points, mesh.faces[face, (i + 2) % 3], mesh.faces[face, (i + 1) % 3])
+        square = dot(along, along)
         if square > longest:
             longest = square
             side = i
@@ -144,29 +62,29 @@ def _flip_if_better(mesh, f, i, tolerance):
     g = mesh.neighbours[f, i]
     if g < 0 or mesh.labels[f, i] != 0:
         return False
-    j = _side_towards(mesh, g, f)
+    j = side_towards(mesh, g, f)
     fy, fx, gx, gy = (i + 1) % 3, (i + 2) % 3, (j + 1) % 3, (j + 2) % 3  # sides y a, a x, x b, b y
     if mesh.neighbours[f, fy] == g or mesh.neighbours[f, fx] == g:
         return False  # a has two faces only
     a, x, y, b = mesh.faces[f, i], mesh.faces[f, fy], mesh.faces[f, fx], mesh.faces[g, j]
     points = mesh.points
-    ax, ay = _difference(points, x, a), _difference(points, y, a)
-    bx, by = _difference(points, x, b), _difference(points, y, b)
-    area_f, area_g = _cross(ax, ay), _cross(by, bx)
-    sine = _length(area_f) * _dot(bx, by) + _length(area_g) * _dot(ax, ay)
-    if sine >= -_DELAUNAY_MARGIN * _length(ax) * _length(ay) * _length(bx) * _length(by):
+    ax, ay = difference(points, x, a), difference(points, y, a)
+    bx, by = difference(points, x, b), difference(points, y, b)
+    area_f, area_g = cross(ax, ay), cross(by, bx)
+    sine = length(area_f) * dot(bx, by) + length(area_g) * dot(ax, ay)
+    if sine >= -_DELAUNAY_MARGIN * length(ax) * length(ay) * length(bx) * length(by):
         return False
-    ab = _difference(points, b, a)
-    across = _cross(ab, _difference(points, y, x))
-    if _length(across) == 0.0:
+    ab = difference(points, b, a)
+    across = cross(ab, difference(points, y, x))
+    if length(across) == 0.0:
         return False
-    deviation = max(mesh.deviation[f], mesh.deviation[g]) + abs(_dot(ax, across)) / _length(across)
+    deviation = max(mesh.deviation[f], mesh.deviation[g]) + abs(dot(ax, across)) / length(across)
     if deviation > tolerance:
         return False
     whole = (area_f[0] + area_g[0], area_f[1] + area_g[1], area_f[2] + area_g[2])
-    new_f, new_g = _cross(ax, ab), _cross(ab, ay)
-    least = _MIN_NORMAL_COSINE * _length(whole)
-    if _dot(new_f, whole) <= least * _length(new_f) or _dot(new_g, whole) <= least * _length(new_g):
+    new_f, new_g = cross(ax, ab), cross(ab, ay)
+    least = _MIN_NORMAL_COSINE * length(whole)
+    if dot(new_f, whole) <= least * length(new_f) or dot(new_g, whole) <= least * length(new_g):
         return False
     if _has_edge(mesh, f, i, b):
         return False
@@ -175,10 +93,10 @@ def _flip_if_better(mesh, f, i, tolerance):
     across_xb, across_by = mesh.neighbours[g, gx], mesh.neighbours[g, gy]
     label_ya, label_ax = mesh.labels[f, fy], mesh.labels[f, fx]
     label_xb, label_by = mesh.labels[g, gx], mesh.labels[g, gy]
-    _write_face(mesh, f, (a, x, b), (across_xb, g, across_ax), (label_xb, 0, label_ax))
-    _write_face(mesh, g, (a, b, y), (across_by, across_ya, f), (label_by, label_ya, 0))
-    _replace_neighbour(mesh, across_xb, g, f)
-    _replace_neighbour(mesh, across_ya, f, g)
+    write_face(mesh, f, (a, x, b), (across_xb, g, across_ax), (label_xb, 0, label_ax))
+    write_face(mesh, g, (a, b, y), (across_by, across_ya, f), (label_by, label_ya, 0))
+    replace_neighbour(mesh, across_xb, g, f)
+    replace_neighbour(mesh, across_ya, f, g)
     mesh.deviation[f] = deviation
     mesh.deviation[g] = deviation
     return True
@@ -220,19 +138,19 @@ def _split_side(mesh, n_points, n_faces, f, i):
     new_f = n_faces
     new_g = n_faces + 1 if g >= 0 else -1
     across, label_across = mesh.neighbours[f, fy], mesh.labels[f, fy]
-    _write_face(mesh, new_f, (a, middle, y), (new_g, across, f), (label, label_across, 0))
-    _write_face(mesh, f, (a, x, middle), (g, new_f, mesh.neighbours[f, fx]), (label, 0, mesh.labels[f, fx]))
-    _replace_neighbour(mesh, across, f, new_f)
+    write_face(mesh, new_f, (a, middle, y), (new_g, across, f), (label, label_across, 0))
+    write_face(mesh, f, (a, x, middle), (g, new_f, mesh.neighbours[f, fx]), (label, 0, mesh.labels[f, fx]))
+    replace_neighbour(mesh, across, f, new_f)
     mesh.deviation[new_f] = mesh.deviation[f]
     if g < 0:
         return n_faces + 1
-    j = _side_towards(mesh, g, f)
+    j = side_towards(mesh, g, f)
     gx, gy = (j + 1) % 3, (j + 2) % 3
     b = mesh.faces[g, j]
     across, label_across = mesh.neighbours[g, gy], mesh.labels[g, gy]
-    _write_face(mesh, new_g, (b, y, middle), (new_f, g, across), (label, 0, label_across))
-    _write_face(mesh, g, (b, middle, x), (f, mesh.neighbours[g, gx], new_g), (label, mesh.labels[g, gx], 0))
-    _replace_neighbour(mesh, across, g, new_g)
+    write_face(mesh, new_g, (b, y, middle), (new_f, g, across), (label, 0, label_across))
+    write_face(mesh, g, (b, middle, x), (f, mesh.neighbours[g, gx], new_g), (label, mesh.labels[g, gx], 0))
+    replace_neighbour(mesh, across, g, new_g)
     mesh.deviation[new_g] = mesh.deviation[g]
     return n_faces + 2
 

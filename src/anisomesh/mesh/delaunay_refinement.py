@@ -7,10 +7,10 @@ from dataclasses import dataclass
 import numpy as np
 import numpy.typing as npt
 
-from anisomesh._arrays import EdgeLabels
 from anisomesh._kernels import refinement as kernels
 from anisomesh.errors import OptionError
 from anisomesh.mesh.geometry import thickness
+from anisomesh.mesh.marked_surface import MarkedSurface
 from anisomesh.mesh.surface import Surface
 
 _SHRINK = 0.5**0.5  # of the lengths of the sides split, from pass to pass: long ones first, so that sizes are graded
@@ -22,17 +22,19 @@ class Refinement:
 
     Attributes
     ----------
-    surface
-        The refined surface; its first V points are the points of the parent, unchanged.
+    marked
+        The surface; parts of an edge have its label, new edges 0. Its first V points are the parent's, unchanged.
     parents
         For every point (V', 2) the two earlier points of which it is the middle; for the first V the point itself.
-    labels
-        Labels of its edges (E',), inherited from the edges of the parent; 0 for new edges.
     """
 
-    surface: Surface
+    marked: MarkedSurface
     parents: npt.NDArray[np.int32]
-    labels: EdgeLabels
+
+    @property
+    def surface(self) -> Surface:
+        """The surface itself."""
+        return self.marked.surface
 
     def interpolate(self, values: npt.NDArray[np.float64]) -> npt.NDArray[np.float64]:
         """Interpolate values (V, ...) at the points of the parent to all (V', ...), halfway along each split edge."""
@@ -48,8 +50,7 @@ class Refinement:
 
 
 def refine_slivers(
-    surface: Surface,
-    labels: EdgeLabels,
+    start: MarkedSurface,
     *,
     max_aspect: float,
     min_length: float,
@@ -60,17 +61,15 @@ def refine_slivers(
 
     Parameters
     ----------
-    surface
-        An oriented manifold surface.
-    labels
-        A label for each edge (E,); edges of another label than 0 are split but not flipped.
+    start
+        An oriented manifold surface. Marked edges are split but not flipped.
     max_aspect
         Longest side of a triangle over the height on it, above which it is refined; above 1.2.
     min_length
         Triangles with no longer side are not refined, in model units.
     tolerance
-        Bound on the distance between the surface and the refined one, in model units; 0 flips edges in planes only,
-        and hardly any, as planes are not exact in floating point.
+        Bound on the deviation of faces, with what they have, in model units; 0 flips edges in planes only, and hardly
+        any, as planes are not exact in floating point.
     max_faces
         Bound on the number of faces; where it is reached, shorter sides are not split.
 
@@ -97,14 +96,15 @@ def refine_slivers(
     Rivara, "New longest-edge algorithms for the refinement and/or improvement of unstructured triangulations", 1997.
     Lawson, "Software for C1 surface interpolation", 1977.
     """
+    surface = start.surface
     if max_faces < surface.n_faces:
         raise OptionError(f"max_faces is {max_faces:,}; expected at least the surface's {surface.n_faces:,} faces")
     min_thickness = 0.5 / max_aspect
     bad = np.flatnonzero(thickness(surface.points[surface.faces]) < min_thickness)
     own = np.repeat(np.arange(surface.n_points, dtype=np.int32)[:, None], 2, axis=1)
     if len(bad) == 0:
-        return Refinement(surface=surface, parents=own, labels=labels)
-    mesh = _triangulation(surface, labels, max_faces)
+        return Refinement(marked=start, parents=own)
+    mesh = start.triangulation(max_faces)
     mesh.stack[: len(bad)] = bad
     kernels.flip_to_delaunay(mesh, len(bad), tolerance)
     n_points, n_faces = surface.n_points, surface.n_faces
@@ -113,26 +113,6 @@ def refine_slivers(
         length = max(_SHRINK * length, min_length)
         n_points, n_faces = kernels.refine(mesh, n_points, n_faces, min_thickness, length**2, tolerance)
     refined = Surface(mesh.points[:n_points].copy(), mesh.faces[:n_faces].copy())
-    new_labels = np.zeros(len(refined.edges), dtype=labels.dtype)
-    new_labels[refined.face_edges] = mesh.labels[:n_faces]
     mesh.parents[: surface.n_points] = own
-    return Refinement(surface=refined, parents=mesh.parents[:n_points].copy(), labels=new_labels)
-
-
-def _triangulation(surface: Surface, labels: EdgeLabels, max_faces: int) -> kernels.Triangulation:
-    """Return the surface in arrays with room for ``max_faces`` faces and as many points as they can have."""
-    max_points = surface.n_points + max_faces - surface.n_faces
-    mesh = kernels.Triangulation(
-        points=np.empty((max_points, 3)),
-        faces=np.empty((max_faces, 3), dtype=np.int32),
-        neighbours=np.full((max_faces, 3), -1, dtype=np.int32),
-        labels=np.zeros((max_faces, 3), dtype=labels.dtype),
-        parents=np.zeros((max_points, 2), dtype=np.int32),
-        deviation=np.zeros(max_faces),
-        stack=np.empty(max_faces, dtype=np.int32),
-    )
-    mesh.points[: surface.n_points] = surface.points
-    mesh.faces[: surface.n_faces] = surface.faces
-    mesh.neighbours[: surface.n_faces] = surface.face_neighbours
-    mesh.labels[: surface.n_faces] = labels[surface.face_edges]
-    return mesh
+    kept = np.arange(max_faces) < n_faces
+    return Refinement(marked=MarkedSurface.of(refined, mesh, kept), parents=mesh.parents[:n_points].copy())

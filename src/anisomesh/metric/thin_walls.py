@@ -57,7 +57,8 @@ def separate_thin_walls(field: MetricField, surface: Surface, n_vertices: int, c
     width = rim.widths(surface, patch)
     spacing, smallest = _spacing(surface, given, n_vertices)
     candidates = rim.alignments(surface, patch) < _MAX_ALIGNMENT
-    candidates &= np.sqrt(_means(surface, patch, smallest)) * width < _MAX_WIDTH * spacing
+    open_width = np.where(candidates, width, 0.0)  # a closed patch is infinitely wide
+    candidates &= np.sqrt(_means(surface, patch, smallest)) * open_width < _MAX_WIDTH * spacing
     faces = np.flatnonzero(candidates[patch])
     if len(faces) == 0:
         return field
@@ -68,8 +69,8 @@ def separate_thin_walls(field: MetricField, surface: Surface, n_vertices: int, c
     squared_across[faces] = np.einsum("fx,fxy,fy->f", across, tensors, across)
     squared_along[faces] = np.einsum("fx,fxy,fy->f", along, tensors, along)
     length = np.sqrt(_means(surface, patch, squared_along)) * rim.perimeters(surface, patch) / 2.0
-    narrow = np.sqrt(_means(surface, patch, squared_across)) * width < _MAX_WIDTH * spacing
-    thin = (candidates & narrow & (length > _MIN_LENGTH * spacing))[patch[faces]]
+    candidates &= np.sqrt(_means(surface, patch, squared_across)) * open_width < _MAX_WIDTH * spacing
+    thin = (candidates & (length > _MIN_LENGTH * spacing))[patch[faces]]
     if not thin.any():
         return field
     faces, across = faces[thin], across[thin]

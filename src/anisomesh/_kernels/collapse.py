@@ -1,0 +1,334 @@
+"""Collapses of short edges within a tolerance; points only go to points that are there, and creases stay."""
+
+from typing import Any, NamedTuple
+
+from .compiled import inlined, kernel
+from .triangulation import cross, dot, length
+
+_MIN_NORMAL_COSINE = 0.97  # between the normals of a triangle before and after a collapse; heuristic
+_MIN_CREASE_COSINE = 0.7  # of the turn of a crease at a point that goes; sharper ones are corners
+SLIVER_THICKNESS = 0.125  # area over squared longest side, below which a triangle is a sliver; heuristic
+_MIN_THICKNESS = 0.05  # area over squared longest side of a new triangle, unless there was a thinner one; heuristic
+
+
+class Stars(NamedTuple):
+    """Workspace for the faces around two points; points with more faces than there is room for stay.
+
+    Attributes
+    ----------
+    faces, corners
+        The faces counter-clockwise around the point that goes, and its corner in each (n,).
+    other_faces, other_corners
+        The same for the point that it goes to (n,).
+    marks
+        The last collapse that looked at each point as a neighbour (V,).
+    """
+
+    faces: Any
+    corners: Any
+    other_faces: Any
+    other_corners: Any
+    marks: Any
+
+
+@inlined
+def _point(points, p):
+    return points[p, 0], points[p, 1], points[p, 2]
+
+
+@inlined
+def _minus(u, v):
+    return u[0] - v[0], u[1] - v[1], u[2] - v[2]
+
+
+@inlined
+def _step(u, share, v):
+    """Return u - share v."""
+    return u[0] - share * v[0], u[1] - share * v[1], u[2] - share * v[2]
+
+
+@inlined
+def _square(u):
+    return dot(u, u)
+
+
+@kernel
+def square_to_triangle(p, a, b, c):
+    """Return the squared distance of point p to triangle a b c; not a number for some degenerate triangles.
+
+    References
+    ----------
+    Ericson, "Real-Time Collision Detection", 2005, section 5.1.5.
+    """
+    ab, ac, ap, bp, cp = _minus(b, a), _minus(c, a), _minus(p, a), _minus(p, b), _minus(p, c)
+    ab_a, ac_a, ab_b, ac_b, ab_c, ac_c = dot(ab, ap), dot(ac, ap), dot(ab, bp), dot(ac, bp), dot(ab, cp), dot(ac, cp)
+    if ab_a <= 0.0 and ac_a <= 0.0:
+        return _square(ap)
+    if ab_b >= 0.0 and ac_b <= ab_b:
+        return _square(bp)
+    at_c = ab_a * ac_b - ab_b * ac_a
+    if at_c <= 0.0 and ab_a >= 0.0 and ab_b <= 0.0:
+        return _square(_step(ap, ab_a / (ab_a - ab_b), ab))
+    if ac_c >= 0.0 and ab_c <= ac_c:
+        return _square(cp)
+    at_b = ab_c * ac_a - ab_a * ac_c
+    if at_b <= 0.0 and ac_a >= 0.0 and ac_c <= 0.0:
+        return _square(_step(ap, ac_a / (ac_a - ac_c), ac))
+    at_a = ab_b * ac_c - ab_c * ac_b
+    towards_c, towards_b = ac_b - ab_b, ab_c - ac_c
+    if at_a <= 0.0 and towards_c >= 0.0 and towards_b >= 0.0:
+        return _square(_step(bp, towards_c / (towards_c + towards_b), _minus(c, b)))
+    total = at_a + at_b + at_c
+    return _square(_step(_step(ap, at_b / total, ab), at_c / total, ac))
+
+
+@kernel
+def _corner_of(mesh, face, point):
+    """Return the corner of a face that is a point."""
+    corner = 0
+    while mesh.faces[face, corner] != point:
+        corner += 1
+    return corner
+
+
+@kernel
+def _walk(mesh, face, corner, faces, corners):
+    """Write the faces around a corner and the corners in them, counter-clockwise; return their number and closedness.
+
+    Around a point inside they start at the face, around a point of the boundary at the boundary. The number is -1 if
+    there is no room for them.
+    """
+    point, start = mesh.faces[face, corner], face
+    closed = False
+    while not closed:
+        before = mesh.neighbours[face, (corner + 2) % 3]
+        if before < 0:
+            break
+        face, corner = before, _corner_of(mesh, before, point)
+        closed = face == start
+    first, n = face, 0
+    while n < len(faces):
+        faces[n], corners[n] = face, corner
+        n += 1
+        after = mesh.neighbours[face, (corner + 1) % 3]
+        if after < 0 or after == first:
+            return n, closed
+        face, corner = after, _corner_of(mesh, after, point)
+    return -1, closed
+
+
+@kernel
+def _keeps_topology(mesh, stars, n, closed, other, last, stamp):
+    """Return whether the two points have no other common neighbours than the collapse joins (the link condition)."""
+    for k in range(n):
+        face, corner = stars.faces[k], stars.corners[k]
+        ring = mesh.faces[face, (corner + 1) % 3]
+        joined = k == 1 if not last else k == n - 1
+        joined = joined or (closed and k == n - 1)
+        if ring != other and not joined and stars.marks[ring] == stamp:
+            return False
+    far_end = mesh.faces[stars.faces[n - 1], (stars.corners[n - 1] + 2) % 3]
+    if not closed and not last and n > 1 and stars.marks[far_end] == stamp:
+        return False
+    if closed and n == 3:
+        face, corner = stars.faces[1], stars.corners[1]
+        across = mesh.neighbours[face, corner]
+        if across >= 0:
+            for i in range(3):
+                if mesh.faces[across, i] == other:
+                    return False
+    return n > 2 if closed else n > 1
+
+
+@kernel
+def _crease_end(mesh, stars, n, closed, last):
+    """Return where the crease goes on beyond the point that goes: -1 if there is none, -2 if the point has to stay."""
+    first_face, first_corner = stars.faces[0], stars.corners[0]
+    last_face, last_corner = stars.faces[n - 1], stars.corners[n - 1]
+    if not closed:
+        for k in range(1, n):
+            if mesh.labels[stars.faces[k], (stars.corners[k] + 2) % 3] != 0:
+                return -2
+        if mesh.labels[first_face, (first_corner + 2) % 3] != mesh.labels[last_face, (last_corner + 1) % 3]:
+            return -2
+        if last:
+            return mesh.faces[first_face, (first_corner + 1) % 3]
+        return mesh.faces[last_face, (last_corner + 2) % 3]
+    label = mesh.labels[first_face, (first_corner + 2) % 3]
+    end, count = -1, 0
+    for k in range(1, n):
+        here = mesh.labels[stars.faces[k], (stars.corners[k] + 2) % 3]
+        if here == 0:
+            continue
+        count += 1
+        if here != label:
+            return -2
+        end = mesh.faces[stars.faces[k], (stars.corners[k] + 1) % 3]
+    if count == 0 and label == 0:
+        return -1
+    return end if count == 1 and label != 0 else -2
+
+
+@kernel
+def _crease_deviation(mesh, point, other, end):
+    """Return the distance of a point of a crease to the crease without it; infinite if it is a corner."""
+    p, q, r = _point(mesh.points, point), _point(mesh.points, other), _point(mesh.points, end)
+    there, onward, chord = _minus(p, q), _minus(r, p), _minus(r, q)
+    if not dot(there, onward) >= _MIN_CREASE_COSINE * length(there) * length(onward):
+        return float("inf")
+    return length(cross(there, chord)) / length(chord)
+
+
+@kernel
+def _deviation(mesh, stars, first, end, n, other):
+    """Return how far the surface moves if faces get another corner, or infinity if one turns or gets too thin.
+
+    The largest of the distance of the point that goes to the new faces, and of the middles of new edges to the old
+    ones.
+    """
+    points = mesh.points
+    infinite = float("inf")
+    goes = _point(points, mesh.faces[stars.faces[0], stars.corners[0]])
+    q = _point(points, other)
+    thinnest, thinnest_new, nearest, farthest = infinite, infinite, infinite, 0.0
+    for k in range(n):
+        face, corner = stars.faces[k], stars.corners[k]
+        a = _point(points, mesh.faces[face, (corner + 1) % 3])
+        b = _point(points, mesh.faces[face, (corner + 2) % 3])
+        side, old = _minus(b, a), cross(_minus(a, goes), _minus(b, goes))
+        longest = max(_square(side), _square(_minus(a, goes)), _square(_minus(b, goes)))
+        thinnest = min(thinnest, length(old) / longest)
+        if k < first or k >= end:
+            continue
+        new = cross(_minus(a, q), _minus(b, q))
+        longest = max(_square(side), _square(_minus(a, q)), _square(_minus(b, q)))
+        thinnest_new = min(thinnest_new, length(new) / longest)
+        if not dot(old, new) > _MIN_NORMAL_COSINE * length(old) * length(new):
+            return infinite
+        nearest = min(nearest, square_to_triangle(goes, q, a, b))
+        if k == first:
+            continue
+        middle = _step(q, -0.5, _minus(a, q))
+        square = infinite
+        for m in range(n):
+            old_face, old_corner = stars.faces[m], stars.corners[m]
+            u = _point(points, mesh.faces[old_face, (old_corner + 1) % 3])
+            v = _point(points, mesh.faces[old_face, (old_corner + 2) % 3])
+            square = min(square, square_to_triangle(middle, goes, u, v))
+        farthest = max(farthest, square)
+    if not thinnest_new >= min(thinnest, 2.0 * _MIN_THICKNESS):
+        return infinite
+    return max(nearest, farthest) ** 0.5
+
+
+@kernel
+def _glue(mesh, face, across, end, other_end, label):
+    """Set what is across a side of a face, given by its ends, and its label; face -1 is none."""
+    if face >= 0:
+        side = 3 - _corner_of(mesh, face, end) - _corner_of(mesh, face, other_end)
+        mesh.neighbours[face, side] = across
+        mesh.labels[face, side] = label
+
+
+@kernel
+def _join(mesh, face, point, other):
+    """Remove a face at the collapsing edge: what is across its two other sides become neighbours."""
+    i, j = _corner_of(mesh, face, point), _corner_of(mesh, face, other)
+    inner, outer = mesh.neighbours[face, j], mesh.neighbours[face, i]
+    label = max(mesh.labels[face, i], mesh.labels[face, j])
+    third = mesh.faces[face, 3 - i - j]
+    _glue(mesh, inner, outer, third, point, label)
+    _glue(mesh, outer, inner, third, other, label)
+    mesh.faces[face, 0] = -1
+
+
+@kernel
+def _collapse(mesh, stars, face, corner, last, tolerance, stamp):
+    """Move a corner of a face to the next one, or to the one before if ``last``, and return whether that was done."""
+    point = mesh.faces[face, corner]
+    target = (corner + (2 if last else 1)) % 3
+    other = mesh.faces[face, target]
+    n, closed = _walk(mesh, face, corner, stars.faces, stars.corners)
+    if n < 0 or (not closed and (mesh.neighbours[face, (corner + (1 if last else 2)) % 3] >= 0)):
+        return False
+    end = _crease_end(mesh, stars, n, closed, last)
+    if end == -2:
+        return False
+    n_other, _ = _walk(mesh, face, target, stars.other_faces, stars.other_corners)
+    if n_other < 0:
+        return False
+    for k in range(n_other):
+        for step in range(1, 3):
+            stars.marks[mesh.faces[stars.other_faces[k], (stars.other_corners[k] + step) % 3]] = stamp
+    if not _keeps_topology(mesh, stars, n, closed, other, last, stamp):
+        return False
+    first = 0 if last else 1
+    limit = n - 1 if last or closed else n
+    moved = _deviation(mesh, stars, first, limit, n, other)
+    if end >= 0:
+        moved = max(moved, _crease_deviation(mesh, point, other, end))
+    before = 0.0
+    for k in range(n):
+        before = max(before, mesh.deviation[stars.faces[k]])
+    if not before + moved <= tolerance:
+        return False
+    if first == 1:
+        _join(mesh, stars.faces[0], point, other)
+    if limit == n - 1:
+        _join(mesh, stars.faces[n - 1], point, other)
+    for k in range(first, limit):
+        mesh.faces[stars.faces[k], stars.corners[k]] = other
+        mesh.deviation[stars.faces[k]] = before + moved
+    return True
+
+
+@kernel
+def collapse_short_edges(mesh, stars, first_movable, max_square, sliver_square, tolerance, stamp):
+    """Collapse edges of no larger square once over all faces, as far as the surface moves within the tolerance.
+
+    Faces that go have -1 as their first corner.
+
+    Parameters
+    ----------
+    mesh
+        The triangulation; its deviations grow with every collapse.
+    stars
+        Workspace; marks are at most ``stamp``.
+    first_movable
+        Points before this one stay.
+    max_square, sliver_square
+        Largest squared length, and the same for the edges of slivers.
+    tolerance
+        Largest deviation.
+    stamp
+        Number of tries before.
+
+    Returns
+    -------
+    tuple
+        Numbers of collapses, and of tries in all.
+    """
+    count = 0
+    for face in range(len(mesh.faces)):
+        corner = 0
+        while corner < 3 and mesh.faces[face, 0] >= 0:
+            if mesh.faces[face, corner] < first_movable:
+                corner += 1
+                continue
+            after, before = (corner + 1) % 3, (corner + 2) % 3
+            p = _point(mesh.points, mesh.faces[face, corner])
+            to_after = _minus(_point(mesh.points, mesh.faces[face, after]), p)
+            to_before = _minus(_point(mesh.points, mesh.faces[face, before]), p)
+            longest = max(_square(to_after), _square(to_before), _square(_minus(to_after, to_before)))
+            is_sliver = length(cross(to_after, to_before)) < 2.0 * SLIVER_THICKNESS * longest
+            limit = sliver_square if is_sliver else max_square
+            done = False
+            if _square(to_after) <= limit:
+                stamp += 1
+                done = _collapse(mesh, stars, face, corner, False, tolerance, stamp)
+            if not done and mesh.neighbours[face, after] < 0 and _square(to_before) <= limit:
+                stamp += 1
+                done = _collapse(mesh, stars, face, corner, True, tolerance, stamp)
+            count += done
+            corner = 0 if done else corner + 1
+    return count, stamp
