@@ -12,8 +12,8 @@ WEAK_ANGLE = 20.0  # degrees; edges this sharp stay when slivers are triangulate
 
 _MAX_FLAT_ANGLE = 1e-3  # sine of the angle between face normals at a flat edge; above the rounding of files, heuristic
 _MIN_CORNER_TURN = 45.0  # degrees between the two sharp edges at a corner; heuristic
-_MIN_APEX_DEFECT = 20.0  # degrees by which the angles at an apex miss 360; heuristic
-_MIN_APEX_SHARE = 2.0  # of the apex in the sum over its neighbours; heuristic
+_MIN_APEX_DEFECT = 20.0  # degrees by which the angles around an apex fall short of 360; heuristic
+_MIN_APEX_FACTOR = 2.0  # times what is missing around all its neighbours together; heuristic
 
 
 def sharp_edges(surface: Surface, angle: float) -> EdgeMask:
@@ -54,8 +54,8 @@ def corners(surface: Surface, sharp: EdgeMask) -> PointMask:
 def apexes(surface: Surface, sharp: EdgeMask) -> PointMask:
     """Return which points (V,) off the sharp edges (E,) and the boundary are apexes, as of a cone.
 
-    The sum of the angles around an apex is less than 360 degrees by 20 or more, and by twice as much as the sums around
-    its neighbours off the sharp edges differ from that in all. So the tips of smooth and of rough surfaces are none.
+    The angles around an apex fall short of 360 degrees by 20 or more, and by more than twice as much as the angles
+    around all its neighbours off the sharp edges together. So tips of smooth and of rough surfaces do not count.
     """
     angles = geometry.corner_angles(surface.points[surface.faces])
     total = np.bincount(surface.faces.ravel(), angles.ravel(), minlength=surface.n_points)
@@ -66,7 +66,7 @@ def apexes(surface: Surface, sharp: EdgeMask) -> PointMask:
     around = np.zeros(surface.n_points)
     for ends in (surface.edges, surface.edges[:, ::-1]):
         np.add.at(around, ends[:, 0], np.abs(defect[ends[:, 1]]))
-    return np.asarray((defect > np.radians(_MIN_APEX_DEFECT)) & (defect > _MIN_APEX_SHARE * around))
+    return np.asarray((defect > np.radians(_MIN_APEX_DEFECT)) & (defect > _MIN_APEX_FACTOR * around))
 
 
 def points_along(surface: Surface, edges: EdgeMask, spacing: float) -> Points:

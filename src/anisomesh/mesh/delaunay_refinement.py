@@ -68,8 +68,8 @@ def refine_slivers(
     min_length
         Triangles with no longer side are not refined, in model units.
     tolerance
-        Bound on the deviation of faces, with what they have, in model units; 0 flips edges in planes only, and hardly
-        any, as planes are not exact in floating point.
+        Bound on the deviation of faces, including their present one, in model units; 0 flips edges in planes only,
+        and hardly any, as planes are not exact in floating point.
     max_faces
         Bound on the number of faces; where it is reached, shorter sides are not split.
 

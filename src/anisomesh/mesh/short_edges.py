@@ -50,7 +50,7 @@ def collapse_short_edges(start: MarkedSurface, *, max_length: float, tolerance: 
         Edges up to this length may be collapsed, in model units; three times as long ones of slivers, triangles whose
         longest side is more than four times their height.
     tolerance
-        Bound on the deviation of faces, with what they have, in model units.
+        Bound on the deviation of faces, including their present one, in model units.
     n_kept
         The first so many points stay.
 
