@@ -19,6 +19,7 @@ from tensorboard.backend.event_processing.event_accumulator import EventAccumula
 
 import anisomesh  # noqa: E402
 from anisomesh.errors import OptionError  # noqa: E402
+from anisomesh.features.detect import WEAK_ANGLE, sharp_edges  # noqa: E402
 from anisomesh.learn.data.items import load_item  # noqa: E402
 from anisomesh.learn.data.manifest import ItemFiles, files_of  # noqa: E402
 from anisomesh.learn.inference.predict import predict  # noqa: E402
@@ -352,8 +353,9 @@ def test_a_remesh_takes_the_metric_of_a_trained_network(files, tmp_path, run_cli
     result = anisomesh.remesh(surface, n_vertices=150, embedding="neural", weights=weights, max_iterations=20)
     assert result.surface.n_points == 150
     unit = surface.with_points(unit_frame(surface.points).to_unit(surface.points))
-    none = np.zeros(len(unit.edges), dtype=bool)
-    found = predict(working_surface(unit, 150, creases=none, tagged=none).surface, weights)
+    creases = sharp_edges(unit, WEAK_ANGLE)
+    working = working_surface(unit, 150, creases=creases, tagged=np.zeros_like(creases))
+    found = predict(working.surface, weights)
     np.testing.assert_allclose(result.working.points, found.points, atol=1e-6)
     stretch = np.sqrt(np.linalg.eigvalsh(found.tensors)[:, 2])
     assert stretch.mean() > 1.1

@@ -7,7 +7,10 @@ from anisomesh.embedding.base import EmbeddingStatus, achieved_stretch, target_s
 from anisomesh.embedding.direct import embed
 from anisomesh.embedding.gradient import face_frames, face_gradient, face_tensors
 from anisomesh.errors import OptionError
+from anisomesh.mesh.geometry import unit_frame
 from anisomesh.mesh.surface import Surface
+from anisomesh.mesh.working_surface import working_surface
+from anisomesh.metric.sources import Curvature
 from anisomesh.metric.tensors import compute_metric, uniform_metric
 from anisomesh.shapes.analytic import box, cylinder, open_patch, sphere, torus
 
@@ -147,3 +150,15 @@ def test_options_out_of_range_are_refused(options):
     surface = sphere(1)
     with pytest.raises(OptionError, match=next(iter(options))):
         embed(surface, uniform_metric(surface), **options)
+
+
+def test_the_embedding_of_a_needle_stays_small():
+    """Regression: the global step failed by rounding on triangles of aspect 1e6, with points at 1e12."""
+    points = np.array([[0, 0, 0], [1, 0, 0], [0.5, 1e-9, 0], [0.5, 0, 1e-9]])
+    surface = Surface(points, np.array([[0, 2, 1], [0, 1, 3], [1, 2, 3], [2, 0, 3]]))
+    surface = surface.with_points(unit_frame(surface.points).to_unit(surface.points))
+    none = np.zeros(len(surface.edges), dtype=bool)
+    needle = working_surface(surface, 50, creases=none, tagged=none).surface
+    field = Curvature()(needle)
+    embedding = embed(needle, field.tensors, corner_tensors=field.corner_tensors)
+    assert np.abs(embedding.points).max() < 1e6

@@ -15,6 +15,8 @@ from anisomesh.mesh.surface import Surface
 
 _POSITION_WEIGHT = 0.01  # of the coordinates in the start, relative to unit normals; matters on flat parts only
 _INVARIANT_WEIGHT = 0.2  # of the invariant columns of the start; chosen on training meshes
+_MAX_INCREASE = 1.01  # ratio of residuals of two steps, above which it has grown by rounding; heuristic
+_MAX_EXTENT = 1e4  # diagonals times the largest root of the metric that coordinates may reach; far above any geodesic
 _MIN_ROOT_EIGENVALUE = 1e-12  # of T_f - c^2 I, over the largest of T_f: smaller ones are rounding errors, set to 0
 
 
@@ -151,12 +153,16 @@ def _local_global(
     integrate = poisson_solver(surface, gradient)
     norm = float(np.einsum("f,fij,fij->", gradient.areas, root, root))
     target = np.empty((surface.n_faces, 2, start.shape[1]))
-    extra, residual = start, np.inf
+    largest = _MAX_EXTENT * surface.diagonal * float(np.abs(root).max())
+    extra, residual, before = start, np.inf, start
     for iteration in range(max_iterations + 1):
         jacobian = (gradient.operator @ extra).reshape(target.shape)
         previous = residual
         residual = float(np.sqrt(local_step(jacobian, root, gradient.frames, gradient.areas, target) / norm))
+        far = iteration > 0 and not np.abs(extra).max() <= largest
+        if far or not residual <= _MAX_INCREASE * previous:  # on needles the global step may fail by rounding
+            return before, previous, iteration
         if iteration == max_iterations or (iteration > 1 and residual > (1.0 - tolerance) * previous):
             break
-        extra = integrate(target)
+        before, extra = extra, integrate(target)
     return extra, residual, iteration
