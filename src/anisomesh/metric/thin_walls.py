@@ -20,14 +20,10 @@ _MIN_LENGTH = 2.0  # its length; shorter ones are specks
 _SEPARATION = 1.0  # width that a narrow patch is given
 
 _MAX_ALIGNMENT = 0.7  # length of the mean normal beyond its rim; 0 between parallel faces, 1 at a step; heuristic
-_MAX_NARROW_SHARE = (
-    0.5  # of a rim beside other narrow patches: a rod or needle has no faces to be moved apart; heuristic
-)
 _SMOOTHING_ROUNDS = 2  # that outvote the ends of a narrow patch, where its rim runs across; heuristic
 
 Floats = npt.NDArray[np.float64]
 Ints = npt.NDArray[np.integer]
-PatchMask = npt.NDArray[np.bool_]
 
 
 def separate_thin_walls(field: MetricField, surface: Surface, n_vertices: int, crease_angle: float) -> MetricField:
@@ -50,9 +46,8 @@ def separate_thin_walls(field: MetricField, surface: Surface, n_vertices: int, c
     A cell of the tessellation is what is nearest to its site, so on a plate much thinner than the distance of vertices
     one cell covers both faces, and one site cannot follow both creases of the rim: the outline is cut to a zigzag
     between them. Here the rim, a patch of small width w beyond whose two long sides the surface faces about opposite
-    ways and that is not beside other such patches, as on a rod, is made one distance h of vertices wide: in its
-    direction e across, the metric becomes (h / w)^2 e e^t. Its embedding moves the two faces apart by as much and
-    leaves them as they are, so that the metric changes nowhere else.
+    ways, is made one distance h of vertices wide: in its direction e across, the metric becomes (h / w)^2 e e^t. Its
+    embedding moves the two faces apart by as much and leaves them as they are, so that the metric changes nowhere else.
     """
     if field.extra is not None:
         return field
@@ -75,7 +70,6 @@ def separate_thin_walls(field: MetricField, surface: Surface, n_vertices: int, c
     squared_along[faces] = np.einsum("fx,fxy,fy->f", along, tensors, along)
     length = np.sqrt(_means(surface, patch, squared_along)) * rim.perimeters(surface, patch) / 2.0
     candidates &= np.sqrt(_means(surface, patch, squared_across)) * open_width < _MAX_WIDTH * spacing
-    candidates &= rim.shares_beside(surface, patch, candidates) < _MAX_NARROW_SHARE
     thin = (candidates & (length > _MIN_LENGTH * spacing))[patch[faces]]
     if not thin.any():
         return field
@@ -123,12 +117,6 @@ class _Rim:
         total = np.linalg.norm([self._sums(patch, x) for x in normals.T], axis=0) + self._sums(patch, length * ~closed)
         perimeter = self.perimeters(surface, patch)
         return np.asarray(np.divide(total, perimeter, out=np.ones(len(perimeter)), where=perimeter > 0.0))
-
-    def shares_beside(self, surface: Surface, patch: FaceLabels, chosen: PatchMask) -> Floats:
-        """Return the share of the rim of each patch (P,) that is beside one of the chosen patches (P,)."""
-        length = surface.edge_lengths[self.edge] * (self.beyond >= 0) * chosen[patch[self.beyond]]
-        perimeter = self.perimeters(surface, patch)
-        return np.divide(self._sums(patch, length), perimeter, out=np.zeros(len(perimeter)), where=perimeter > 0.0)
 
     def _sums(self, patch: FaceLabels, values: Floats) -> Floats:
         return np.bincount(patch[self.face], values, minlength=int(patch.max()) + 1).astype(np.float64)
