@@ -6,7 +6,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 from sliver_shapes import comb, needle_tube, thick_comb
 
-from anisomesh._kernels.collapse import square_to_triangle
+from anisomesh._kernels.vectors import square_to_triangle
 from anisomesh.features.detect import sharp_edges
 from anisomesh.mesh.closest_points import ClosestPoints
 from anisomesh.mesh.marked_surface import MarkedSurface

@@ -2,17 +2,17 @@
 
 from typing import Any, NamedTuple
 
-from .compiled import inlined, kernel
-from .triangulation import cross, dot, length
+from .compiled import kernel
+from .vectors import coordinates, cross, dot, length, square_to_triangle, squared_length, subtract, subtract_share
 
 _MIN_NORMAL_COSINE = 0.97  # between the normals of a triangle before and after a collapse; heuristic
 _MIN_CREASE_COSINE = 0.7  # of the turn of a crease at a point that goes; sharper ones are corners
-SLIVER_THICKNESS = 0.125  # area over squared longest side, below which a triangle is a sliver; heuristic
+_SLIVER_THICKNESS = 0.125  # area over squared longest side, below which a triangle is a sliver; heuristic
 _MIN_THICKNESS = 0.05  # area over squared longest side of a new triangle, unless there was a thinner one; heuristic
 
 
 class Stars(NamedTuple):
-    """Workspace for the faces around two points; points with more faces than there is room for stay.
+    """Workspace for the faces around two points; points with more faces than it holds stay.
 
     Attributes
     ----------
@@ -31,57 +31,6 @@ class Stars(NamedTuple):
     marks: Any
 
 
-@inlined
-def _point(points, p):
-    return points[p, 0], points[p, 1], points[p, 2]
-
-
-@inlined
-def _minus(u, v):
-    return u[0] - v[0], u[1] - v[1], u[2] - v[2]
-
-
-@inlined
-def _step(u, share, v):
-    """Return u - share v."""
-    return u[0] - share * v[0], u[1] - share * v[1], u[2] - share * v[2]
-
-
-@inlined
-def _square(u):
-    return dot(u, u)
-
-
-@kernel
-def square_to_triangle(p, a, b, c):
-    """Return the squared distance of point p to triangle a b c; not a number for some degenerate triangles.
-
-    References
-    ----------
-    Ericson, "Real-Time Collision Detection", 2005, section 5.1.5.
-    """
-    ab, ac, ap, bp, cp = _minus(b, a), _minus(c, a), _minus(p, a), _minus(p, b), _minus(p, c)
-    ab_a, ac_a, ab_b, ac_b, ab_c, ac_c = dot(ab, ap), dot(ac, ap), dot(ab, bp), dot(ac, bp), dot(ab, cp), dot(ac, cp)
-    if ab_a <= 0.0 and ac_a <= 0.0:
-        return _square(ap)
-    if ab_b >= 0.0 and ac_b <= ab_b:
-        return _square(bp)
-    at_c = ab_a * ac_b - ab_b * ac_a
-    if at_c <= 0.0 and ab_a >= 0.0 and ab_b <= 0.0:
-        return _square(_step(ap, ab_a / (ab_a - ab_b), ab))
-    if ac_c >= 0.0 and ab_c <= ac_c:
-        return _square(cp)
-    at_b = ab_c * ac_a - ab_a * ac_c
-    if at_b <= 0.0 and ac_a >= 0.0 and ac_c <= 0.0:
-        return _square(_step(ap, ac_a / (ac_a - ac_c), ac))
-    at_a = ab_b * ac_c - ab_c * ac_b
-    towards_c, towards_b = ac_b - ab_b, ab_c - ac_c
-    if at_a <= 0.0 and towards_c >= 0.0 and towards_b >= 0.0:
-        return _square(_step(bp, towards_c / (towards_c + towards_b), _minus(c, b)))
-    total = at_a + at_b + at_c
-    return _square(_step(_step(ap, at_b / total, ab), at_c / total, ac))
-
-
 @kernel
 def _corner_of(mesh, face, point):
     """Return the corner of a face that is a point."""
@@ -96,7 +45,7 @@ def _walk(mesh, face, corner, faces, corners):
     """Write the faces around a corner and the corners in them, counter-clockwise; return their number and closedness.
 
     Around a point inside they start at the face, around a point of the boundary at the boundary. The number is -1 if
-    there is no room for them.
+    they exceed the workspace.
     """
     point, start = mesh.faces[face, corner], face
     closed = False
@@ -172,8 +121,8 @@ def _crease_end(mesh, stars, n, closed, last):
 @kernel
 def _crease_deviation(mesh, point, other, end):
     """Return the distance of a point of a crease to the crease without it; infinite if it is a corner."""
-    p, q, r = _point(mesh.points, point), _point(mesh.points, other), _point(mesh.points, end)
-    there, onward, chord = _minus(p, q), _minus(r, p), _minus(r, q)
+    p, q, r = coordinates(mesh.points, point), coordinates(mesh.points, other), coordinates(mesh.points, end)
+    there, onward, chord = subtract(p, q), subtract(r, p), subtract(r, q)
     if not dot(there, onward) >= _MIN_CREASE_COSINE * length(there) * length(onward):
         return float("inf")
     return length(cross(there, chord)) / length(chord)
@@ -188,32 +137,32 @@ def _deviation(mesh, stars, first, end, n, other):
     """
     points = mesh.points
     infinite = float("inf")
-    goes = _point(points, mesh.faces[stars.faces[0], stars.corners[0]])
-    q = _point(points, other)
+    goes = coordinates(points, mesh.faces[stars.faces[0], stars.corners[0]])
+    q = coordinates(points, other)
     thinnest, thinnest_new, nearest, farthest = infinite, infinite, infinite, 0.0
     for k in range(n):
         face, corner = stars.faces[k], stars.corners[k]
-        a = _point(points, mesh.faces[face, (corner + 1) % 3])
-        b = _point(points, mesh.faces[face, (corner + 2) % 3])
-        side, old = _minus(b, a), cross(_minus(a, goes), _minus(b, goes))
-        longest = max(_square(side), _square(_minus(a, goes)), _square(_minus(b, goes)))
+        a = coordinates(points, mesh.faces[face, (corner + 1) % 3])
+        b = coordinates(points, mesh.faces[face, (corner + 2) % 3])
+        side, old = subtract(b, a), cross(subtract(a, goes), subtract(b, goes))
+        longest = max(squared_length(side), squared_length(subtract(a, goes)), squared_length(subtract(b, goes)))
         thinnest = min(thinnest, length(old) / longest)
         if k < first or k >= end:
             continue
-        new = cross(_minus(a, q), _minus(b, q))
-        longest = max(_square(side), _square(_minus(a, q)), _square(_minus(b, q)))
+        new = cross(subtract(a, q), subtract(b, q))
+        longest = max(squared_length(side), squared_length(subtract(a, q)), squared_length(subtract(b, q)))
         thinnest_new = min(thinnest_new, length(new) / longest)
         if not dot(old, new) > _MIN_NORMAL_COSINE * length(old) * length(new):
             return infinite
         nearest = min(nearest, square_to_triangle(goes, q, a, b))
         if k == first:
             continue
-        middle = _step(q, -0.5, _minus(a, q))
+        middle = subtract_share(q, -0.5, subtract(a, q))
         square = infinite
         for m in range(n):
             old_face, old_corner = stars.faces[m], stars.corners[m]
-            u = _point(points, mesh.faces[old_face, (old_corner + 1) % 3])
-            v = _point(points, mesh.faces[old_face, (old_corner + 2) % 3])
+            u = coordinates(points, mesh.faces[old_face, (old_corner + 1) % 3])
+            v = coordinates(points, mesh.faces[old_face, (old_corner + 2) % 3])
             square = min(square, square_to_triangle(middle, goes, u, v))
         farthest = max(farthest, square)
     if not thinnest_new >= min(thinnest, 2.0 * _MIN_THICKNESS):
@@ -316,17 +265,19 @@ def collapse_short_edges(mesh, stars, first_movable, max_square, sliver_square, 
                 corner += 1
                 continue
             after, before = (corner + 1) % 3, (corner + 2) % 3
-            p = _point(mesh.points, mesh.faces[face, corner])
-            to_after = _minus(_point(mesh.points, mesh.faces[face, after]), p)
-            to_before = _minus(_point(mesh.points, mesh.faces[face, before]), p)
-            longest = max(_square(to_after), _square(to_before), _square(_minus(to_after, to_before)))
-            is_sliver = length(cross(to_after, to_before)) < 2.0 * SLIVER_THICKNESS * longest
+            p = coordinates(mesh.points, mesh.faces[face, corner])
+            to_after = subtract(coordinates(mesh.points, mesh.faces[face, after]), p)
+            to_before = subtract(coordinates(mesh.points, mesh.faces[face, before]), p)
+            longest = max(
+                squared_length(to_after), squared_length(to_before), squared_length(subtract(to_after, to_before))
+            )
+            is_sliver = length(cross(to_after, to_before)) < 2.0 * _SLIVER_THICKNESS * longest
             limit = sliver_square if is_sliver else max_square
             done = False
-            if _square(to_after) <= limit:
+            if squared_length(to_after) <= limit:
                 stamp += 1
                 done = _collapse(mesh, stars, face, corner, False, tolerance, stamp)
-            if not done and mesh.neighbours[face, after] < 0 and _square(to_before) <= limit:
+            if not done and mesh.neighbours[face, after] < 0 and squared_length(to_before) <= limit:
                 stamp += 1
                 done = _collapse(mesh, stars, face, corner, True, tolerance, stamp)
             count += done

@@ -5,7 +5,8 @@ added at their ends.
 """
 
 from .compiled import kernel
-from .triangulation import cross, difference, dot, length, replace_neighbour, side_towards, write_face
+from .triangulation import difference, replace_neighbour, side_towards, write_face
+from .vectors import cross, dot, length
 
 _MIN_NORMAL_COSINE = 0.8  # between the normal of a new triangle and the area vector of the two; heuristic
 _DELAUNAY_MARGIN = 1e-9  # sine of the sum of the opposite angles that counts as zero, above rounding

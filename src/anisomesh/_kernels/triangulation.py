@@ -1,9 +1,8 @@
-"""A triangle mesh that kernels change, with what all of them need: vectors, and faces across sides.
+"""A triangle mesh that kernels change, with what all of them need: faces across sides.
 
 Side i of a face is opposite its corner i.
 """
 
-from math import sqrt
 from typing import Any, NamedTuple
 
 from .compiled import inlined, kernel
@@ -44,24 +43,6 @@ def difference(points, p, q):
 
 
 @inlined
-def cross(u, v):
-    """Return the cross product of two vectors."""
-    return u[1] * v[2] - u[2] * v[1], u[2] * v[0] - u[0] * v[2], u[0] * v[1] - u[1] * v[0]
-
-
-@inlined
-def dot(u, v):
-    """Return the scalar product of two vectors."""
-    return u[0] * v[0] + u[1] * v[1] + u[2] * v[2]
-
-
-@inlined
-def length(u):
-    """Return the length of a vector."""
-    return sqrt(dot(u, u))
-
-
-@inlined
 def write_row(table, row, values):
     """Write three values to a row of a table."""
     table[row, 0] = values[0]
@@ -88,6 +69,6 @@ def side_towards(mesh, face, neighbour):
 
 @kernel
 def replace_neighbour(mesh, face, old, new):
-    """Make a face the neighbour of another one in place of the old one; -1 is no face."""
+    """Make a face the neighbour of another one in place of the old one; face -1 stands for none."""
     if face >= 0:
         mesh.neighbours[face, side_towards(mesh, face, old)] = new

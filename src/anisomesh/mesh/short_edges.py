@@ -52,7 +52,7 @@ def collapse_short_edges(start: MarkedSurface, *, max_length: float, tolerance: 
     tolerance
         Bound on the deviation of faces, including their present one, in model units.
     n_kept
-        The first so many points stay.
+        Number of points, from the first on, that are not removed.
 
     Returns
     -------
