@@ -62,6 +62,10 @@ class RemeshOptions:
     denoise
         Whether noise that a network finds in the input is removed first. Designed surfaces, on which a tenth of the
         edges or more are flat, are left as they are.
+    fit
+        Whether the mesh is fitted to the input at the end: vertices move and edges are flipped such that distance and
+        shape of the triangles get better together. Without it the result is the dual of the tessellation, as in the
+        paper.
     seed
         Seed of the start positions; the same seed and input give the same result. If the mesh has inverted or
         intersecting triangles that the input does not explain, the next two seeds are tried.
@@ -93,6 +97,7 @@ class RemeshOptions:
     weights: str | os.PathLike[str] | None = None
     device: str = "cpu"
     denoise: bool = True
+    fit: bool = True
     seed: int = 0
     threads: int = 2
     lloyd_iterations: int = 9
@@ -117,8 +122,9 @@ class RemeshOptions:
             raise OptionError(f"time_limit = {self.time_limit}; expected a positive number of seconds")
         if self.threads > MAX_THREADS:
             raise OptionError(f"threads = {self.threads}; expected at most {MAX_THREADS}")
-        if not isinstance(self.denoise, bool):
-            raise OptionError(f"denoise = {self.denoise!r}; expected True or False")
+        for name in ("denoise", "fit"):
+            if not isinstance(getattr(self, name), bool):
+                raise OptionError(f"{name} = {getattr(self, name)!r}; expected True or False")
         if not isinstance(self.weights, str | os.PathLike | None):
             raise OptionError(f"weights = {self.weights!r}; expected the name of a network or of a file")
         self._check_stages()

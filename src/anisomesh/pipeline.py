@@ -24,15 +24,17 @@ from anisomesh.embedding.embedder import checked_embedding
 from anisomesh.errors import OptionError, TimeLimitError
 from anisomesh.features.detect import WEAK_ANGLE, apexes, sharp_edges
 from anisomesh.features.network import FeatureNetwork, trace_features
+from anisomesh.fitting.target import FitTarget, fit_without_faults
 from anisomesh.inputs import PreparedInput, prepared_input
 from anisomesh.io.convert import as_surface
 from anisomesh.memory import check_memory
+from anisomesh.mesh.closest_points import ClosestPoints
 from anisomesh.mesh.embedded_surface import EmbeddedSurface
 from anisomesh.mesh.geometry import unit_frame
 from anisomesh.mesh.surface import Surface
 from anisomesh.mesh.validity import Validity, check_validity
 from anisomesh.mesh.working_surface import working_surface
-from anisomesh.metric.field import checked_field
+from anisomesh.metric.field import MetricField, checked_field
 from anisomesh.metric.narrow_patches import limit_to_patches
 from anisomesh.metric.thin_walls import separate_thin_walls
 from anisomesh.options import RemeshOptions
@@ -152,8 +154,9 @@ def _remesh(source: PreparedInput, n: int, options: RemeshOptions, run: _Run) ->
             n_vertices=n,
             deadline=run.deadline,
         )
+        target = _fit_target(task, working, field, options) if options.fit else None
     run.check_time()
-    made = _valid_mesh(task, options, run)
+    made = _valid_mesh(task, target, options, run)
     mesh, optimised, validity = made.mesh, made.optimised, made.validity
     return RemeshResult(
         surface=Surface(frame.to_model(mesh.points), mesh.faces),
@@ -180,6 +183,17 @@ def _remesh(source: PreparedInput, n: int, options: RemeshOptions, run: _Run) ->
     )
 
 
+def _fit_target(task: MeshingTask, working: Surface, field: MetricField, options: RemeshOptions) -> FitTarget:
+    """Return what meshes are fitted to; the field is on the working surface."""
+    return FitTarget.of(
+        task.reference,
+        metric=(ClosestPoints(working), field),
+        features=(task.voronoi.embedded.surface, task.features),
+        n_vertices=task.n_vertices,
+        crease_angle=options.feature_angle,
+    )
+
+
 @dataclass(frozen=True, kw_only=True, eq=False)
 class _Made:
     """A mesh, the sites it was made from, and the seed of their start."""
@@ -195,22 +209,22 @@ class _Made:
         return self.validity.inverted + self.validity.new_intersections + self.validity.flat
 
 
-def _valid_mesh(task: MeshingTask, options: RemeshOptions, run: _Run) -> _Made:
+def _valid_mesh(task: MeshingTask, target: FitTarget | None, options: RemeshOptions, run: _Run) -> _Made:
     """Return the mesh of a task; from the next seeds while it has faults that the input does not explain."""
-    best = made = _mesh_of_start(task, options, run)
+    best = made = _mesh_of_start(task, target, options, run)
     for seed in range(options.seed + 1, options.seed + MAX_STARTS):
         explained = made.validity.self_intersections_input > 0 or made.mesh.from_input
         if not best.faults or explained or run.deadline.passed():
             break
         fresh = RestrictedVoronoi(task.voronoi.embedded, threads=options.threads)
-        made = _mesh_of_start(replace(task, voronoi=fresh), replace(options, seed=seed), run)
+        made = _mesh_of_start(replace(task, voronoi=fresh), target, replace(options, seed=seed), run)
         if made.faults < best.faults:
             best = made
     return best
 
 
-def _mesh_of_start(task: MeshingTask, options: RemeshOptions, run: _Run) -> _Made:
-    """Return the mesh of a task from the sites that start from the seed of the options."""
+def _mesh_of_start(task: MeshingTask, target: FitTarget | None, options: RemeshOptions, run: _Run) -> _Made:
+    """Return the mesh of a task from the sites that start from the seed of the options, fitted to the target."""
     with run.stage("cvt"):
         optimised = optimise_sites(
             task.voronoi,
@@ -223,7 +237,12 @@ def _mesh_of_start(task: MeshingTask, options: RemeshOptions, run: _Run) -> _Mad
         )
     with run.stage("dual"):
         mesh = mesh_from_sites(task, optimised.sites)
-        validity = check_validity(Surface(mesh.points, mesh.faces), task.surface)
+    with run.stage("fit"):
+        surface = Surface(mesh.points, mesh.faces)
+        if target is not None:
+            surface = fit_without_faults(surface, target, crease_edges=mesh.crease_edges, deadline=run.deadline)
+            mesh = replace(mesh, points=surface.points, faces=surface.faces)
+        validity = check_validity(surface, task.surface)
     return _Made(mesh=mesh, optimised=optimised, validity=validity, seed=options.seed)
 
 

@@ -13,7 +13,7 @@ class StepInfo:
     Attributes
     ----------
     stage
-        ``"load"``, ``"prepare"``, ``"metric"``, ``"embed"``, ``"cvt"``, ``"dual"`` or ``"search"``.
+        ``"load"``, ``"prepare"``, ``"metric"``, ``"embed"``, ``"cvt"``, ``"dual"``, ``"fit"`` or ``"search"``.
     iteration, total
         Iterations done, and an upper bound on them; 0 where a stage has none.
     energy

@@ -147,7 +147,7 @@ def test_corners_of_a_machine_part_are_met():
 def test_progress_names_the_stages_and_counts_iterations(ring):
     steps = []
     anisomesh.remesh(ring, n_vertices=100, on_step=steps.append, **FEW)
-    assert list(dict.fromkeys(step.stage for step in steps)) == ["prepare", "metric", "embed", "cvt", "dual"]
+    assert list(dict.fromkeys(step.stage for step in steps)) == ["prepare", "metric", "embed", "cvt", "dual", "fit"]
     counted = [step.iteration for step in steps if step.energy is not None]
     assert counted == sorted(counted)
     assert all(step.iteration <= step.total for step in steps if step.energy is not None)

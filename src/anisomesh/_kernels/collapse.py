@@ -3,6 +3,7 @@
 from typing import Any, NamedTuple
 
 from .compiled import kernel
+from .triangulation import corner_of, faces_around
 from .vectors import coordinates, cross, dot, length, square_to_triangle, squared_length, subtract, subtract_share
 
 _MIN_NORMAL_COSINE = 0.97  # between the normals of a triangle before and after a collapse; heuristic
@@ -29,41 +30,6 @@ class Stars(NamedTuple):
     other_faces: Any
     other_corners: Any
     marks: Any
-
-
-@kernel
-def _corner_of(mesh, face, point):
-    """Return the corner of a face that is a point."""
-    corner = 0
-    while mesh.faces[face, corner] != point:
-        corner += 1
-    return corner
-
-
-@kernel
-def _walk(mesh, face, corner, faces, corners):
-    """Write the faces around a corner and the corners in them, counter-clockwise; return their number and closedness.
-
-    Around a point inside they start at the face, around a point of the boundary at the boundary. The number is -1 if
-    they exceed the workspace.
-    """
-    point, start = mesh.faces[face, corner], face
-    closed = False
-    while not closed:
-        before = mesh.neighbours[face, (corner + 2) % 3]
-        if before < 0:
-            break
-        face, corner = before, _corner_of(mesh, before, point)
-        closed = face == start
-    first, n = face, 0
-    while n < len(faces):
-        faces[n], corners[n] = face, corner
-        n += 1
-        after = mesh.neighbours[face, (corner + 1) % 3]
-        if after < 0 or after == first:
-            return n, closed
-        face, corner = after, _corner_of(mesh, after, point)
-    return -1, closed
 
 
 @kernel
@@ -174,7 +140,7 @@ def _deviation(mesh, stars, first, end, n, other):
 def _glue(mesh, face, across, end, other_end, label):
     """Set what is across a side of a face, given by its ends, and its label; face -1 is none."""
     if face >= 0:
-        side = 3 - _corner_of(mesh, face, end) - _corner_of(mesh, face, other_end)
+        side = 3 - corner_of(mesh, face, end) - corner_of(mesh, face, other_end)
         mesh.neighbours[face, side] = across
         mesh.labels[face, side] = label
 
@@ -182,7 +148,7 @@ def _glue(mesh, face, across, end, other_end, label):
 @kernel
 def _join(mesh, face, point, other):
     """Remove a face at the collapsing edge: what is across its two other sides become neighbours."""
-    i, j = _corner_of(mesh, face, point), _corner_of(mesh, face, other)
+    i, j = corner_of(mesh, face, point), corner_of(mesh, face, other)
     inner, outer = mesh.neighbours[face, j], mesh.neighbours[face, i]
     label = max(mesh.labels[face, i], mesh.labels[face, j])
     third = mesh.faces[face, 3 - i - j]
@@ -197,13 +163,13 @@ def _collapse(mesh, stars, face, corner, last, tolerance, stamp):
     point = mesh.faces[face, corner]
     target = (corner + (2 if last else 1)) % 3
     other = mesh.faces[face, target]
-    n, closed = _walk(mesh, face, corner, stars.faces, stars.corners)
+    n, closed = faces_around(mesh, face, corner, stars.faces, stars.corners)
     if n < 0 or (not closed and (mesh.neighbours[face, (corner + (1 if last else 2)) % 3] >= 0)):
         return False
     end = _crease_end(mesh, stars, n, closed, last)
     if end == -2:
         return False
-    n_other, _ = _walk(mesh, face, target, stars.other_faces, stars.other_corners)
+    n_other, _ = faces_around(mesh, face, target, stars.other_faces, stars.other_corners)
     if n_other < 0:
         return False
     for k in range(n_other):

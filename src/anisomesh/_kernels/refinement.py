@@ -5,7 +5,7 @@ added at their ends.
 """
 
 from .compiled import kernel
-from .triangulation import difference, replace_neighbour, side_towards, write_face
+from .triangulation import difference, flip_side, has_edge, replace_neighbour, side_towards, write_face
 from .vectors import cross, dot, length
 
 _MIN_NORMAL_COSINE = 0.8  # between the normal of a new triangle and the area vector of the two; heuristic
@@ -35,24 +35,6 @@ def _longest_side(mesh, face):
 
 
 @kernel
-def _has_edge(mesh, face, corner, other):
-    """Return whether there is an edge from a corner of a face to another point."""
-    point = mesh.faces[face, corner]
-    for turn in range(1, 3):
-        current = face
-        while current >= 0:
-            i = 0
-            while mesh.faces[current, i] != point:
-                i += 1
-            if mesh.faces[current, (i + 1) % 3] == other or mesh.faces[current, (i + 2) % 3] == other:
-                return True
-            current = mesh.neighbours[current, (i + turn) % 3]
-            if current == face:
-                return False
-    return False
-
-
-@kernel
 def _flip_if_better(mesh, f, i, tolerance):
     """Flip side i of a face if that makes it Delaunay, and return whether it was flipped.
 
@@ -64,7 +46,7 @@ def _flip_if_better(mesh, f, i, tolerance):
     if g < 0 or mesh.labels[f, i] != 0:
         return False
     j = side_towards(mesh, g, f)
-    fy, fx, gx, gy = (i + 1) % 3, (i + 2) % 3, (j + 1) % 3, (j + 2) % 3  # sides y a, a x, x b, b y
+    fy, fx = (i + 1) % 3, (i + 2) % 3  # sides y a, a x
     if mesh.neighbours[f, fy] == g or mesh.neighbours[f, fx] == g:
         return False  # a has two faces only
     a, x, y, b = mesh.faces[f, i], mesh.faces[f, fy], mesh.faces[f, fx], mesh.faces[g, j]
@@ -87,17 +69,9 @@ def _flip_if_better(mesh, f, i, tolerance):
     least = _MIN_NORMAL_COSINE * length(whole)
     if dot(new_f, whole) <= least * length(new_f) or dot(new_g, whole) <= least * length(new_g):
         return False
-    if _has_edge(mesh, f, i, b):
+    if has_edge(mesh, f, i, b):
         return False
-
-    across_ya, across_ax = mesh.neighbours[f, fy], mesh.neighbours[f, fx]
-    across_xb, across_by = mesh.neighbours[g, gx], mesh.neighbours[g, gy]
-    label_ya, label_ax = mesh.labels[f, fy], mesh.labels[f, fx]
-    label_xb, label_by = mesh.labels[g, gx], mesh.labels[g, gy]
-    write_face(mesh, f, (a, x, b), (across_xb, g, across_ax), (label_xb, 0, label_ax))
-    write_face(mesh, g, (a, b, y), (across_by, across_ya, f), (label_by, label_ya, 0))
-    replace_neighbour(mesh, across_xb, g, f)
-    replace_neighbour(mesh, across_ya, f, g)
+    flip_side(mesh, f, i, j)
     mesh.deviation[f] = deviation
     mesh.deviation[g] = deviation
     return True

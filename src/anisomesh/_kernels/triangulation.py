@@ -72,3 +72,75 @@ def replace_neighbour(mesh, face, old, new):
     """Make a face the neighbour of another one in place of the old one; face -1 stands for none."""
     if face >= 0:
         mesh.neighbours[face, side_towards(mesh, face, old)] = new
+
+
+@kernel
+def corner_of(mesh, face, point):
+    """Return the corner of a face that is a point."""
+    corner = 0
+    while mesh.faces[face, corner] != point:
+        corner += 1
+    return corner
+
+
+@kernel
+def faces_around(mesh, face, corner, faces, corners):
+    """Write the faces around a corner and the corners in them, counter-clockwise; return their number and closedness.
+
+    Around a point inside they start at the face, around a point of the boundary at the boundary. The number is -1 if
+    they exceed the workspace.
+    """
+    point, start = mesh.faces[face, corner], face
+    closed = False
+    while not closed:
+        before = mesh.neighbours[face, (corner + 2) % 3]
+        if before < 0:
+            break
+        face, corner = before, corner_of(mesh, before, point)
+        closed = face == start
+    first, n = face, 0
+    while n < len(faces):
+        faces[n], corners[n] = face, corner
+        n += 1
+        after = mesh.neighbours[face, (corner + 1) % 3]
+        if after < 0 or after == first:
+            return n, closed
+        face, corner = after, corner_of(mesh, after, point)
+    return -1, closed
+
+
+@kernel
+def has_edge(mesh, face, corner, other):
+    """Return whether there is an edge from a corner of a face to another point."""
+    point = mesh.faces[face, corner]
+    for turn in range(1, 3):
+        current = face
+        while current >= 0:
+            i = 0
+            while mesh.faces[current, i] != point:
+                i += 1
+            if mesh.faces[current, (i + 1) % 3] == other or mesh.faces[current, (i + 2) % 3] == other:
+                return True
+            current = mesh.neighbours[current, (i + turn) % 3]
+            if current == face:
+                return False
+    return False
+
+
+@kernel
+def flip_side(mesh, f, i, j):
+    """Flip side i of a face, which is side j of the face across: side x y of a x y and b y x becomes a b.
+
+    The face becomes a x b and the one across a b y; the new side has the label 0.
+    """
+    g = mesh.neighbours[f, i]
+    fy, fx, gx, gy = (i + 1) % 3, (i + 2) % 3, (j + 1) % 3, (j + 2) % 3  # sides y a, a x, x b, b y
+    a, x, y, b = mesh.faces[f, i], mesh.faces[f, fy], mesh.faces[f, fx], mesh.faces[g, j]
+    across_ya, across_ax = mesh.neighbours[f, fy], mesh.neighbours[f, fx]
+    across_xb, across_by = mesh.neighbours[g, gx], mesh.neighbours[g, gy]
+    label_ya, label_ax = mesh.labels[f, fy], mesh.labels[f, fx]
+    label_xb, label_by = mesh.labels[g, gx], mesh.labels[g, gy]
+    write_face(mesh, f, (a, x, b), (across_xb, g, across_ax), (label_xb, 0, label_ax))
+    write_face(mesh, g, (a, b, y), (across_by, across_ya, f), (label_by, label_ya, 0))
+    replace_neighbour(mesh, across_xb, g, f)
+    replace_neighbour(mesh, across_ya, f, g)

@@ -6,6 +6,8 @@ from pathlib import Path
 
 from anisomesh._kernels import (
     diagram,
+    fit_moves,
+    fit_samples,
     graph_hierarchy,
     integrate,
     intersections,
@@ -25,6 +27,12 @@ _REMESH = (
     neighbours.displacements,
     neighbours.walk,
     local_step.local_step,
+    fit_moves.move_points,
+    fit_moves.flip_edges,
+    fit_samples.walk_samples,
+    fit_samples.average_roots,
+    fit_samples.fit_error,
+    fit_samples.quality_sum,
 )
 _NETWORK = (
     messages.mean_messages,

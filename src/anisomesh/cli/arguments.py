@@ -85,6 +85,10 @@ REMESH_OPTIONS: dict[str, Any] = {
         bool,
         _option("--denoise/--keep-noise", help="Remove the noise that the network finds, or keep it."),
     ],
+    "fit": Annotated[
+        bool,
+        _option("--fit/--no-fit", help="Fit the mesh to the input at the end, or leave the dual of the tessellation."),
+    ],
     "seed": Annotated[
         int,
         _option(min=0, help="Seed of the initial sites; the same seed and input give the same result."),

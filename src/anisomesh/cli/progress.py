@@ -17,6 +17,7 @@ _STAGE_LABELS = {
     "embed": "embedding",
     "cvt": "moving the sites",
     "dual": "building the triangles",
+    "fit": "fitting them to the input",
     "search": "searching the number of vertices",
 }
 _SECONDS_BETWEEN_LINES = 5.0  # heuristic

@@ -15,7 +15,7 @@ _METRIC_SOURCES = {
     "neural": "neural (metric predicted by a network)",
     "hybrid": "hybrid (mean of the measured and the predicted metric)",
 }
-_STAGE_ORDER = ("load", "prepare", "metric", "embed", "cvt", "dual")
+_STAGE_ORDER = ("load", "prepare", "metric", "embed", "cvt", "dual", "fit")
 
 
 def as_json(report: dict[str, Any]) -> str:

@@ -1,4 +1,4 @@
-"""Faults of a mesh, and new sites near them."""
+"""New sites near the faults of a mesh."""
 
 from __future__ import annotations
 
@@ -6,20 +6,10 @@ import numpy as np
 import numpy.typing as npt
 from scipy.spatial import cKDTree
 
-from anisomesh._arrays import EmbeddedPoints, Faces, Points, Sites
+from anisomesh._arrays import EmbeddedPoints, Sites
 from anisomesh.delaunay.creases import MIN_SITE_DISTANCE
 from anisomesh.mesh.closest_points import ClosestPoints
 from anisomesh.mesh.embedded_surface import EmbeddedSurface
-from anisomesh.mesh.geometry import is_flat
-from anisomesh.mesh.surface import Surface
-from anisomesh.mesh.validity import inverted_faces, new_intersections
-
-
-def faulty_faces(points: Points, faces: Faces, reference: ClosestPoints) -> npt.NDArray[np.int64]:
-    """Return the faces (n,) that have no area, are inverted against the reference, or intersect where it does not."""
-    mesh = Surface(points, faces)
-    bad = np.flatnonzero(is_flat(points[faces]) | inverted_faces(mesh, reference))
-    return np.union1d(bad, new_intersections(mesh, reference))
 
 
 def points_at_faults(

@@ -12,13 +12,14 @@ from anisomesh._arrays import Faces, PointMask, Points, PointTensors, Sites
 from anisomesh.deadline import NO_DEADLINE, Deadline
 from anisomesh.delaunay.delta_complex import simplicial_mesh
 from anisomesh.delaunay.dual import dual_mesh
-from anisomesh.delaunay.faults import faulty_faces, points_at_faults
+from anisomesh.delaunay.faults import points_at_faults
 from anisomesh.delaunay.placement import place_vertices
 from anisomesh.delaunay.topology_control import ControlledCells, control_topology
 from anisomesh.features.network import FeatureNetwork
 from anisomesh.mesh.closest_points import ClosestPoints
 from anisomesh.mesh.surface import Surface
 from anisomesh.mesh.topology import edge_keys, half_edges
+from anisomesh.mesh.validity import faulty_faces
 from anisomesh.meshops.collapse import decimate, fixed_by
 from anisomesh.meshops.edge_recovery import recover_edges
 from anisomesh.meshops.flip import flip_for_shape
@@ -118,6 +119,8 @@ class ValidMesh:
     ----------
     points, faces
         The mesh in space, in the units of the embedded surface.
+    crease_edges
+        Ends of its edges along creases (n, 2).
     cells
         The cell components of the diagram that it is dual to.
     inserted
@@ -130,6 +133,7 @@ class ValidMesh:
 
     points: Points
     faces: Faces
+    crease_edges: EdgeEnds
     cells: CellComplex
     inserted: int
     removed: int
@@ -174,7 +178,7 @@ def mesh_from_sites(task: MeshingTask, sites: Sites) -> ValidMesh:
     """
     reference, n_start = task.reference, len(sites)
     best = trial = _attempt(task, sites, n_start)
-    faulty = bad = faulty_faces(best.points, best.faces, reference)
+    faulty = bad = faulty_faces(Surface(best.points, best.faces), reference)
     for _ in range(MAX_REPEATS):
         if len(bad) == 0 or trial.from_input or task.deadline.passed():
             break
@@ -184,7 +188,7 @@ def mesh_from_sites(task: MeshingTask, sites: Sites) -> ValidMesh:
             break
         sites = np.concatenate([sites, more])
         trial = _attempt(task, sites, n_start)
-        bad = faulty_faces(trial.points, trial.faces, reference)
+        bad = faulty_faces(Surface(trial.points, trial.faces), reference)
         as_few = len(trial.points) <= max(task.n_vertices, len(best.points))
         if len(bad) == 0 or (len(bad) < len(faulty) and as_few):
             best, faulty = trial, bad
@@ -208,6 +212,7 @@ def _attempt(task: MeshingTask, sites: Sites, n_start: int) -> ValidMesh:
     return ValidMesh(
         points=points,
         faces=faces,
+        crease_edges=_edges_left(faces, _renumbered(mesh.points, points)[mesh.crease_edges]),
         cells=controlled.cells,
         inserted=max(n_first - n_start, 0) if dual is not None else 0,
         removed=max(n_first - len(points), 0),
@@ -225,7 +230,7 @@ def _dual_in_space(task: MeshingTask, controlled: ControlledCells) -> FeatureMes
         return None
     space = place_vertices(cells, task.features, controlled.boundary, creased, points, faces)
     faces = recover_edges(space, faces, creased.paths, task.reference)
-    links = creased.links[np.isin(edge_keys(creased.links), edge_keys(half_edges(faces)))]
+    links = _edges_left(faces, creased.links)
     locked = np.zeros(len(space), dtype=bool)
     locked[creased.cell[creased.corner][: int(MAX_LOCKED_SHARE * task.n_vertices)]] = True
     return FeatureMesh(space, faces, links, locked)
@@ -236,11 +241,23 @@ def _without_inverted(task: MeshingTask, mesh: FeatureMesh) -> FeatureMesh:
     points, faces, _ = remove_inverted_triangles(mesh.points, mesh.faces, task.reference, deadline=task.deadline)
     if points is mesh.points:
         return FeatureMesh(points, faces, mesh.crease_edges, mesh.locked)
-    places = {point.tobytes(): number for number, point in enumerate(points)}
-    number = np.array([places.get(point.tobytes(), -1) for point in mesh.points], dtype=np.int64)
-    links, locked = number[mesh.crease_edges], np.zeros(len(points), dtype=bool)
+    number = _renumbered(mesh.points, points)
+    locked = np.zeros(len(points), dtype=bool)
     locked[number[mesh.locked & (number >= 0)]] = True
+    links = number[mesh.crease_edges]
     return FeatureMesh(points, faces, links[(links >= 0).all(axis=1)], locked)
+
+
+def _renumbered(before: Points, after: Points) -> npt.NDArray[np.int64]:
+    """Return the number that each point (V,) has afterwards, -1 if there is none at its place."""
+    places = {point.tobytes(): number for number, point in enumerate(after)}
+    return np.array([places.get(point.tobytes(), -1) for point in before], dtype=np.int64)
+
+
+def _edges_left(faces: Faces, ends: EdgeEnds) -> EdgeEnds:
+    """Return which pairs of points (n, 2) are edges of the faces; the points may be -1."""
+    ends = ends[(ends >= 0).all(axis=1)]
+    return ends[np.isin(edge_keys(ends), edge_keys(half_edges(faces)))]
 
 
 def _coarsened(task: MeshingTask, mesh: FeatureMesh) -> FeatureMesh:

@@ -10,7 +10,7 @@ from typing import Any
 
 import numpy as np
 
-from anisomesh._arrays import FaceMask
+from anisomesh._arrays import FaceLabels, FaceMask
 from anisomesh.mesh.closest_points import ClosestPoints
 from anisomesh.mesh.geometry import is_flat
 from anisomesh.mesh.intersections import Pairs, self_intersections
@@ -139,3 +139,9 @@ def inverted_faces(result: Surface, reference: ClosestPoints) -> FaceMask:
     Baerentzen, Aanaes, "Signed distance computation using the angle weighted pseudonormal", 2005.
     """
     return reference.inverted(result.points[result.faces])
+
+
+def faulty_faces(mesh: Surface, reference: ClosestPoints) -> FaceLabels:
+    """Return the faces (n,) that have no area, are inverted against the reference, or intersect where it does not."""
+    bad = np.flatnonzero(is_flat(mesh.points[mesh.faces]) | inverted_faces(mesh, reference))
+    return np.union1d(bad, new_intersections(mesh, reference)).astype(np.int32)

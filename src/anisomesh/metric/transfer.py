@@ -54,6 +54,13 @@ def transfer_to_corners(reference: ClosestPoints, field: MetricField, surface: S
         return transfer_metric_roots(reference, metric_root(field.tensors), surface.points)
     corners = surface.points[surface.faces]
     inside = corners + _INSET * (corners.mean(axis=1, keepdims=True) - corners)
-    facet, weights = reference.locate(inside.reshape(-1, 3))
+    return roots_near(reference, field, inside.reshape(-1, 3)).reshape(-1, 3, 3, 3)
+
+
+def roots_near(reference: ClosestPoints, field: MetricField, places: Points) -> PointTensors:
+    """Return the roots (n, 3, 3) of a metric field of a reference at the closest points to places (n, 3)."""
+    if field.corner_tensors is None:
+        return transfer_metric_roots(reference, metric_root(field.tensors), places)
+    facet, weights = reference.locate(places)
     roots = metric_root(field.corner_tensors.reshape(-1, 3, 3)).reshape(-1, 3, 3, 3)
-    return np.asarray(np.einsum("nc,ncij->nij", weights, roots[facet])).reshape(-1, 3, 3, 3)
+    return np.asarray(np.einsum("nc,ncij->nij", weights, roots[facet]))

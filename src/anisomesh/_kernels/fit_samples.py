@@ -1,0 +1,107 @@
+"""Passes over all samples of a fitted mesh: the nearest faces, the metric of the faces, error and quality."""
+
+from .compiled import inlined, kernel
+from .fit_patch import OPPOSED_COSINE, quality, unit_normal
+from .vectors import coordinates, dot, square_to_triangle
+
+_MIN_SAME_COSINE = 0.5  # between normals of sample and face, from which on its metric counts there; heuristic
+
+
+@inlined
+def face_points(mesh, face):
+    """Return the coordinates of the corners of a face of the mesh."""
+    points, faces = mesh.points, mesh.faces
+    return (
+        coordinates(points, faces[face, 0]),
+        coordinates(points, faces[face, 1]),
+        coordinates(points, faces[face, 2]),
+    )
+
+
+@kernel
+def walk_samples(fit):
+    """Move every sample to the list of the nearest face, from face to face across sides, and list them anew.
+
+    A face across a side is nearer only if it faces the way of the sample.
+    """
+    mesh, samples = fit.mesh, fit.samples
+    for face in range(len(samples.first)):
+        samples.first[face] = -1
+    for sample in range(len(samples.points)):
+        p, upright = coordinates(samples.points, sample), coordinates(samples.normals, sample)
+        face, best = samples.owner[sample], float("inf")
+        came_from = -1
+        searching = True
+        while searching:
+            a, b, c = face_points(mesh, face)
+            best = min(best, square_to_triangle(p, a, b, c))
+            searching = False
+            nearest = face
+            for side in range(3):
+                other = mesh.neighbours[face, side]
+                if other < 0 or other == came_from:
+                    continue
+                a, b, c = face_points(mesh, other)
+                if dot(upright, unit_normal(a, b, c)[0]) < OPPOSED_COSINE:
+                    continue
+                square = square_to_triangle(p, a, b, c)
+                if square < best:
+                    best, nearest = square, other
+                    searching = True
+            came_from, face = face, nearest
+        samples.owner[sample] = face
+        samples.following[sample] = samples.first[face]
+        samples.first[face] = sample
+
+
+@kernel
+def average_roots(fit, totals):
+    """Set the metric of each face to the mean over its samples that face its way; without any it stays.
+
+    ``totals`` is workspace (F,).
+    """
+    mesh, samples, roots = fit.mesh, fit.samples, fit.roots
+    for face in range(len(totals)):
+        totals[face] = 0.0
+    for sample in range(len(samples.points)):
+        face = samples.owner[sample]
+        a, b, c = face_points(mesh, face)
+        if dot(coordinates(samples.normals, sample), unit_normal(a, b, c)[0]) < _MIN_SAME_COSINE:
+            continue
+        if totals[face] == 0.0:
+            for i in range(3):
+                for j in range(3):
+                    roots[face, i, j] = 0.0
+        totals[face] += samples.weights[sample]
+        for i in range(3):
+            for j in range(3):
+                roots[face, i, j] += samples.weights[sample] * samples.roots[sample, i, j]
+    for face in range(len(totals)):
+        if totals[face] > 0.0:
+            for i in range(3):
+                for j in range(3):
+                    roots[face, i, j] /= totals[face]
+
+
+@kernel
+def fit_error(fit):
+    """Return the sum of the weighted squared distances of all samples to their faces."""
+    mesh, samples = fit.mesh, fit.samples
+    total = 0.0
+    for sample in range(len(samples.points)):
+        a, b, c = face_points(mesh, samples.owner[sample])
+        total += samples.weights[sample] * square_to_triangle(coordinates(samples.points, sample), a, b, c)
+    return total
+
+
+@kernel
+def quality_sum(fit):
+    """Return the sum of the qualities of all faces, and their number."""
+    mesh = fit.mesh
+    total, count = 0.0, 0
+    for face in range(len(fit.roots)):
+        if mesh.faces[face, 0] >= 0:
+            a, b, c = face_points(mesh, face)
+            total += quality(fit.roots[face], a, b, c)
+            count += 1
+    return total, count

@@ -1,0 +1,1 @@
+"""Meshes fitted to a surface by local changes that lower error and improve triangles together."""

@@ -1,0 +1,216 @@
+"""The fit of a mesh to a surface: it lowers error and improves triangles, and keeps topology, corners, what is held."""
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from anisomesh._kernels import fit_moves, fit_samples, vectors
+from anisomesh.features.detect import corners, sharp_edges
+from anisomesh.fitting import fit as fitting
+from anisomesh.fitting.samples import sample_surface
+from anisomesh.fitting.target import FitTarget, fit_without_faults
+from anisomesh.mesh.closest_points import ClosestPoints
+from anisomesh.mesh.distance import surface_distance
+from anisomesh.mesh.surface import Surface
+from anisomesh.mesh.topology import euler_characteristic, is_oriented
+from anisomesh.mesh.validity import faulty_faces
+from anisomesh.metric.field import MetricField
+from anisomesh.metric.quality import anisotropic_quality
+from anisomesh.shapes import analytic as shapes
+from anisomesh.shapes.cad_part import cad_part
+
+NO_EDGES = np.zeros((0, 2), dtype=np.int64)
+
+
+def target_of(surface, tensor=None, crease_angle=40.0, count=20_000):
+    """Return the target of fits to a surface in a metric that is the same everywhere."""
+    tensors = np.tile(np.eye(3) if tensor is None else tensor, (surface.n_points, 1, 1))
+    reference, sharp = ClosestPoints(surface), sharp_edges(surface, crease_angle)
+    samples = sample_surface(
+        surface,
+        count,
+        creases=sharp,
+        metric=(reference, MetricField(tensors=tensors)),
+        rng=np.random.default_rng(1),
+    )
+    return FitTarget(
+        reference=reference,
+        samples=samples,
+        corners=surface.points[corners(surface, sharp)],
+        crease_angle=crease_angle,
+        holds_creases=False,
+    )
+
+
+def shaken(surface, size, seed=0, chosen=None):
+    """Return a surface with points moved by normally distributed vectors of this length over the mean edge length."""
+    moves = np.random.default_rng(seed).normal(size=surface.points.shape) * size * surface.edge_lengths.mean()
+    if chosen is not None:
+        moves[~chosen] = 0.0
+    return Surface(surface.points + moves, surface.faces)
+
+
+coordinate = st.floats(-2.0, 2.0, width=32)
+vector = st.tuples(coordinate, coordinate, coordinate)
+
+
+@given(p=vector, a=vector, b=vector, c=vector)
+def test_the_closest_point_of_a_triangle_is_nearer_than_any_other(p, a, b, c):
+    corner = np.array([a, b, c])
+    sides = corner[[1, 2]] - corner[0]
+    if np.linalg.norm(np.cross(*sides)) < 1e-3:
+        return
+    weights = np.array(vectors.closest_weights(p, a, b, c))
+    assert weights.sum() == pytest.approx(1.0)
+    assert (weights >= -1e-12).all()
+    steps = np.linspace(0.0, 1.0, 12)
+    grid = np.array([(1.0 - u - v, u, v) for u in steps for v in steps if u + v <= 1.0])
+    nearest = np.linalg.norm(grid @ corner - p, axis=1).min()
+    assert np.linalg.norm(weights @ corner - p) <= nearest + 1e-9
+
+
+@given(seed=st.integers(0, 10_000), shift=st.floats(0.1, 10.0))
+def test_small_systems_are_solved(seed, shift):
+    half = np.random.default_rng(seed).normal(size=(3, 3))
+    matrix, right = half @ half.T, np.random.default_rng(seed + 1).normal(size=3)
+    upper = tuple(float(matrix[i, j]) for i in range(3) for j in range(i, 3))
+    step = vectors.solve_symmetric(upper, shift, tuple(right.tolist()))
+    np.testing.assert_allclose(step, np.linalg.solve(matrix + shift * np.eye(3), right), rtol=1e-9, atol=1e-12)
+
+
+def started(mesh, target):
+    """Return the arrays of a fit with the metric of the faces, and a price."""
+    fit = fitting._start(target.task(mesh, NO_EDGES), target.samples)
+    fit_samples.walk_samples(fit)
+    fit_samples.average_roots(fit, np.zeros(mesh.n_faces))
+    return fit, 5.0 * fit_samples.fit_error(fit) / mesh.n_faces
+
+
+def energy_by_search(fit, samples, price):
+    """Return the energy of a fit with the nearest of all triangles for each sample, and without kernels."""
+    mesh = Surface(fit.mesh.points, fit.mesh.faces)
+    quality = anisotropic_quality(mesh.points, mesh.faces, np.repeat(fit.roots[:, None], 3, axis=1))
+    return (samples.weights * ClosestPoints(mesh).squared_distances(samples.points)).sum() + price * (1 - quality).sum()
+
+
+@pytest.mark.parametrize("surface", [shapes.ellipsoid(subdivisions=3), cad_part(6)], ids=["ellipsoid", "part"])
+def test_every_pass_lowers_the_energy(surface):
+    mesh, target = shaken(surface, 0.15, chosen=~corners(surface, sharp_edges(surface, 40.0))), target_of(surface)
+    fit, price = started(mesh, target)
+    order = np.arange(mesh.n_points, dtype=np.int32)
+    before = energy_by_search(fit, target.samples, price)
+    assert fit_samples.fit_error(fit) == pytest.approx(
+        (target.samples.weights * ClosestPoints(mesh).squared_distances(target.samples.points)).sum(), rel=0.02
+    )
+    for work in (
+        lambda: fit_moves.move_points(fit, order, price, 1.0),
+        lambda: fit_moves.flip_edges(fit, price),
+        lambda: fit_moves.move_points(fit, order, price, 1.0),
+    ):
+        roots = fit.roots.copy()
+        assert work() > 0
+        after = energy_by_search(fit, target.samples, price)
+        assert after < before
+        before = after
+        assert np.isfinite(roots).all()
+
+
+def test_samples_are_on_the_lists_of_their_faces_after_every_pass():
+    surface = shapes.torus(n_major=30, n_minor=12)
+    mesh, target = shaken(surface, 0.1), target_of(surface, count=3_000)
+    fit, price = started(mesh, target)
+    for work in (lambda: fit_moves.move_points(fit, np.arange(mesh.n_points, dtype=np.int32), price, 1.0),) * 2 + (
+        lambda: fit_moves.flip_edges(fit, price),
+    ):
+        work()
+        listed = np.full(target.samples.count, -1)
+        for face in range(mesh.n_faces):
+            sample = fit.samples.first[face]
+            while sample >= 0:
+                assert listed[sample] == -1
+                listed[sample] = face
+                sample = fit.samples.following[sample]
+        np.testing.assert_array_equal(listed, fit.samples.owner)
+
+
+@pytest.mark.parametrize("n", [2, 3])
+def test_spheres_come_near_to_the_best_piecewise_linear_surface(n):
+    """A triangle of area A on a unit sphere has the mean squared distance A^2 / 180 at best."""
+    sphere = shapes.sphere(5, radius=0.3)
+    mesh = shapes.sphere(n, radius=0.3)
+    fitted = fit_without_faults(mesh, target_of(sphere, count=60_000), crease_edges=NO_EDGES)
+    bound = sphere.area / mesh.n_faces / 0.3 / np.sqrt(180.0)
+    rms, before = surface_distance(sphere, fitted).rms, surface_distance(sphere, mesh).rms
+    assert 0.95 * bound < rms < 1.15 * bound
+    assert rms < 0.6 * before
+
+
+def test_a_box_with_moved_points_in_its_faces_is_exact_and_gets_even_triangles():
+    box = shapes.box(n=6)
+    at_faces = (np.isclose(box.points, 0.0) | np.isclose(box.points, 1.0)).sum(axis=1)
+    inside = at_faces == 1
+    moves = 0.4 / 6 * np.random.default_rng(3).uniform(-1, 1, box.points.shape)
+    moves[np.isclose(box.points, 0.0) | np.isclose(box.points, 1.0)] = 0.0
+    mesh = Surface(box.points + np.where(inside[:, None], moves, 0.0), box.faces)
+    fitted = fit_without_faults(mesh, target_of(box), crease_edges=NO_EDGES)
+    distance = surface_distance(box, fitted, samples=10_000)
+    assert distance.hausdorff < 1e-9
+    even = np.tile(np.eye(3), (box.n_points, 1, 1))
+    quality = [anisotropic_quality(m.points, m.faces, even).mean() for m in (mesh, fitted)]
+    assert quality[1] > quality[0] + 0.05
+    corner = at_faces == 3
+    np.testing.assert_array_equal(fitted.points[corner], box.points[corner])
+
+
+def test_triangles_get_the_shape_that_the_metric_asks_for():
+    plate = shapes.box(extent=(1.0, 1.0, 0.2), n=8)
+    mesh = shaken(plate, 0.0)
+    target = target_of(plate, tensor=np.diag([1.0, 9.0, 1.0]))
+    fitted = fit_without_faults(mesh, target, crease_edges=NO_EDGES)
+    roots = np.tile(np.diag([1.0, 3.0, 1.0]), (plate.n_points, 1, 1))
+    before, after = (anisotropic_quality(m.points, m.faces, roots).mean() for m in (mesh, fitted))
+    assert after > before + 0.01
+
+
+def test_what_is_held_or_kept_stays():
+    patch = shapes.open_patch(lambda x, y: 0.2 * x * x - 0.1 * y * y, n=12)
+    mesh = shaken(patch, 0.1, chosen=~patch.on_boundary)
+    target = target_of(patch)
+    edges = mesh.edges[::7].astype(np.int64)
+    task = target.task(mesh, edges)
+    task.held[::5] = True
+    fitted = fitting.fit_mesh(task, target.samples)
+    still = task.held | mesh.on_boundary
+    np.testing.assert_array_equal(fitted.points[still], mesh.points[still])
+    assert (fitted.points[~still] != mesh.points[~still]).any()
+    kept = {tuple(sorted(edge)) for edge in edges.tolist()}
+    assert kept <= {tuple(sorted(edge)) for edge in fitted.edges.tolist()}
+    assert (fitted.on_boundary == mesh.on_boundary).all()
+
+
+@given(seed=st.integers(0, 1_000), size=st.floats(0.0, 0.35))
+def test_a_fit_keeps_the_topology_and_adds_no_fault(seed, size):
+    surface = cad_part(5)
+    mesh = shaken(surface, size, seed)
+    target = target_of(surface, count=5_000)
+    fitted = fit_without_faults(mesh, target, crease_edges=NO_EDGES)
+    assert euler_characteristic(fitted.faces) == euler_characteristic(mesh.faces)
+    assert (fitted.edge_face_count == 2).all()
+    assert is_oriented(fitted.faces)
+    assert len(faulty_faces(fitted, target.reference)) <= len(faulty_faces(mesh, target.reference))
+
+
+def test_a_mesh_that_is_exact_stays_as_it_is_where_it_cannot_be_better():
+    box = shapes.box(n=1)
+    fitted = fit_without_faults(box, target_of(box, count=2_000), crease_edges=NO_EDGES)
+    np.testing.assert_array_equal(fitted.points, box.points)
+    assert surface_distance(box, fitted, samples=2_000).hausdorff < 1e-12
+
+
+def test_a_fit_gives_the_same_bits_again():
+    surface = shapes.ellipsoid(subdivisions=3)
+    mesh, target = shaken(surface, 0.1), target_of(surface, count=5_000)
+    first, second = (fit_without_faults(mesh, target, crease_edges=NO_EDGES) for _ in range(2))
+    np.testing.assert_array_equal(first.points, second.points)
+    np.testing.assert_array_equal(first.faces, second.faces)
