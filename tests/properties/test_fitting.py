@@ -1,14 +1,17 @@
 """The fit of a mesh to a surface: it lowers error and improves triangles, and keeps topology, corners, what is held."""
 
+import dataclasses
+
 import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from anisomesh._kernels import fit_moves, fit_samples, vectors
+from anisomesh._kernels import vectors
 from anisomesh.features.detect import corners, sharp_edges
-from anisomesh.fitting import fit as fitting
+from anisomesh.fitting.fit import FitOptions, fit_mesh
 from anisomesh.fitting.samples import sample_surface
+from anisomesh.fitting.state import FitState
 from anisomesh.fitting.target import FitTarget, fit_without_faults
 from anisomesh.mesh.closest_points import ClosestPoints
 from anisomesh.mesh.distance import surface_distance
@@ -79,59 +82,85 @@ def test_small_systems_are_solved(seed, shift):
     np.testing.assert_allclose(step, np.linalg.solve(matrix + shift * np.eye(3), right), rtol=1e-9, atol=1e-12)
 
 
-def started(mesh, target):
-    """Return the arrays of a fit with the metric of the faces, and a price."""
-    fit = fitting._start(target.task(mesh, NO_EDGES), target.samples)
-    fit_samples.walk_samples(fit)
-    fit_samples.average_roots(fit, np.zeros(mesh.n_faces))
-    return fit, 5.0 * fit_samples.fit_error(fit) / mesh.n_faces
-
-
-def energy_by_search(fit, samples, price):
+def energy_by_search(state, samples, price):
     """Return the energy of a fit with the nearest of all triangles for each sample, and without kernels."""
-    mesh = Surface(fit.mesh.points, fit.mesh.faces)
-    quality = anisotropic_quality(mesh.points, mesh.faces, np.repeat(fit.roots[:, None], 3, axis=1))
-    return (samples.weights * ClosestPoints(mesh).squared_distances(samples.points)).sum() + price * (1 - quality).sum()
+    mesh, alive = state.fit.mesh, state.fit.mesh.faces[:, 0] >= 0
+    faces, roots = mesh.faces[alive], state.fit.roots[alive]
+    quality = anisotropic_quality(mesh.points, faces, np.repeat(roots[:, None], 3, axis=1))
+    squared = ClosestPoints(Surface(mesh.points, faces)).squared_distances(samples.points)
+    return (samples.weights * squared).sum() + price * (1 - quality).sum()
+
+
+def assert_consistent(state):
+    """Check neighbours and labels of faces, faces of points, and that each sample is on one list, of its face."""
+    fit, mesh = state.fit, state.fit.mesh
+    alive = np.flatnonzero(mesh.faces[:, 0] >= 0)
+    listed = np.full(len(fit.samples.points), -1)
+    for face in alive.tolist():
+        for side in range(3):
+            other = mesh.neighbours[face, side]
+            x, y = mesh.faces[face, (side + 1) % 3], mesh.faces[face, (side + 2) % 3]
+            if other >= 0:
+                assert {x, y} < set(mesh.faces[other].tolist())
+                back = int(np.flatnonzero(mesh.neighbours[other] == face)[0])
+                assert mesh.labels[other, back] == mesh.labels[face, side]
+        sample = fit.samples.first[face]
+        while sample >= 0:
+            assert listed[sample] == -1
+            listed[sample] = face
+            sample = fit.samples.following[sample]
+    np.testing.assert_array_equal(listed, fit.samples.owner)
+    used = np.unique(mesh.faces[alive])
+    for point in used.tolist():
+        assert point in mesh.faces[fit.face_at[point]]
+    assert (np.delete(fit.face_at, used) == -1).all()
+
+
+def passes(state, price):
+    """Yield a name and a function for every kind of change."""
+
+    def exchange():
+        added = state.split(price, 10)
+        assert added > 0
+        assert_consistent(state)
+        assert state.collapse(price, added) == added
+
+    yield "moves", lambda: state.move(price)
+    yield "flips", lambda: state.flip(price)
+    yield "exchange", exchange
+    yield "moves", lambda: state.move(price)
 
 
 @pytest.mark.parametrize("surface", [shapes.ellipsoid(subdivisions=3), cad_part(6)], ids=["ellipsoid", "part"])
-def test_every_pass_lowers_the_energy(surface):
-    mesh, target = shaken(surface, 0.15, chosen=~corners(surface, sharp_edges(surface, 40.0))), target_of(surface)
-    fit, price = started(mesh, target)
-    order = np.arange(mesh.n_points, dtype=np.int32)
-    before = energy_by_search(fit, target.samples, price)
-    assert fit_samples.fit_error(fit) == pytest.approx(
-        (target.samples.weights * ClosestPoints(mesh).squared_distances(target.samples.points)).sum(), rel=0.02
-    )
-    for work in (
-        lambda: fit_moves.move_points(fit, order, price, 1.0),
-        lambda: fit_moves.flip_edges(fit, price),
-        lambda: fit_moves.move_points(fit, order, price, 1.0),
-    ):
-        roots = fit.roots.copy()
-        assert work() > 0
-        after = energy_by_search(fit, target.samples, price)
-        assert after < before
+def test_every_pass_lowers_the_energy_and_leaves_consistent_arrays(surface):
+    mesh = shaken(surface, 0.15, chosen=~corners(surface, sharp_edges(surface, 40.0)))
+    target = target_of(surface)
+    state = FitState(target.task(mesh, NO_EDGES), target.samples, n_spare=10)
+    price = 0.3 * state.mean_triangle_error
+    before = energy_by_search(state, target.samples, price)
+    assert state.energy(price) == pytest.approx(before, rel=0.02)
+    for name, work in passes(state, price):
+        work()
+        assert_consistent(state)
+        after = energy_by_search(state, target.samples, price)
+        assert after < before, name
         before = after
-        assert np.isfinite(roots).all()
 
 
-def test_samples_are_on_the_lists_of_their_faces_after_every_pass():
+def test_what_was_saved_comes_back():
     surface = shapes.torus(n_major=30, n_minor=12)
     mesh, target = shaken(surface, 0.1), target_of(surface, count=3_000)
-    fit, price = started(mesh, target)
-    for work in (lambda: fit_moves.move_points(fit, np.arange(mesh.n_points, dtype=np.int32), price, 1.0),) * 2 + (
-        lambda: fit_moves.flip_edges(fit, price),
-    ):
-        work()
-        listed = np.full(target.samples.count, -1)
-        for face in range(mesh.n_faces):
-            sample = fit.samples.first[face]
-            while sample >= 0:
-                assert listed[sample] == -1
-                listed[sample] = face
-                sample = fit.samples.following[sample]
-        np.testing.assert_array_equal(listed, fit.samples.owner)
+    state = FitState(target.task(mesh, NO_EDGES), target.samples, n_spare=20)
+    price = state.mean_triangle_error
+    saved, before, error = state.saved(), state.surface(), state.error
+    state.sweep(price)
+    state.split(0.1 * price, 20)
+    assert state.surface().n_points > mesh.n_points
+    state.restore(saved)
+    assert_consistent(state)
+    np.testing.assert_array_equal(state.surface().points, before.points)
+    np.testing.assert_array_equal(state.surface().faces, before.faces)
+    assert state.error == error
 
 
 @pytest.mark.parametrize("n", [2, 3])
@@ -176,11 +205,12 @@ def test_triangles_get_the_shape_that_the_metric_asks_for():
 def test_what_is_held_or_kept_stays():
     patch = shapes.open_patch(lambda x, y: 0.2 * x * x - 0.1 * y * y, n=12)
     mesh = shaken(patch, 0.1, chosen=~patch.on_boundary)
-    target = target_of(patch)
+    target = dataclasses.replace(target_of(patch), holds_creases=True)
     edges = mesh.edges[::7].astype(np.int64)
     task = target.task(mesh, edges)
-    task.held[::5] = True
-    fitted = fitting.fit_mesh(task, target.samples)
+    np.testing.assert_array_equal(np.unique(edges), np.flatnonzero(task.held))
+    task = dataclasses.replace(task, held=np.arange(mesh.n_points) % 5 == 0)
+    fitted = fit_mesh(task, target.samples, FitOptions(rounds=0))
     still = task.held | mesh.on_boundary
     np.testing.assert_array_equal(fitted.points[still], mesh.points[still])
     assert (fitted.points[~still] != mesh.points[~still]).any()

@@ -3,7 +3,7 @@
 from typing import Any, NamedTuple
 
 from .compiled import kernel
-from .triangulation import corner_of, faces_around
+from .triangulation import faces_around, join_across
 from .vectors import coordinates, cross, dot, length, square_to_triangle, squared_length, subtract, subtract_share
 
 _MIN_NORMAL_COSINE = 0.97  # between the normals of a triangle before and after a collapse; heuristic
@@ -137,27 +137,6 @@ def _deviation(mesh, stars, first, end, n, other):
 
 
 @kernel
-def _glue(mesh, face, across, end, other_end, label):
-    """Set what is across a side of a face, given by its ends, and its label; face -1 is none."""
-    if face >= 0:
-        side = 3 - corner_of(mesh, face, end) - corner_of(mesh, face, other_end)
-        mesh.neighbours[face, side] = across
-        mesh.labels[face, side] = label
-
-
-@kernel
-def _join(mesh, face, point, other):
-    """Remove a face at the collapsing edge: what is across its two other sides become neighbours."""
-    i, j = corner_of(mesh, face, point), corner_of(mesh, face, other)
-    inner, outer = mesh.neighbours[face, j], mesh.neighbours[face, i]
-    label = max(mesh.labels[face, i], mesh.labels[face, j])
-    third = mesh.faces[face, 3 - i - j]
-    _glue(mesh, inner, outer, third, point, label)
-    _glue(mesh, outer, inner, third, other, label)
-    mesh.faces[face, 0] = -1
-
-
-@kernel
 def _collapse(mesh, stars, face, corner, last, tolerance, stamp):
     """Move a corner of a face to the next one, or to the one before if ``last``, and return whether that was done."""
     point = mesh.faces[face, corner]
@@ -188,9 +167,9 @@ def _collapse(mesh, stars, face, corner, last, tolerance, stamp):
     if not before + moved <= tolerance:
         return False
     if first == 1:
-        _join(mesh, stars.faces[0], point, other)
+        join_across(mesh, stars.faces[0], point, other)
     if limit == n - 1:
-        _join(mesh, stars.faces[n - 1], point, other)
+        join_across(mesh, stars.faces[n - 1], point, other)
     for k in range(first, limit):
         mesh.faces[stars.faces[k], stars.corners[k]] = other
         mesh.deviation[stars.faces[k]] = before + moved

@@ -12,7 +12,9 @@ from .fit_patch import (
     quality,
     relist,
     remember_normal,
+    set_point,
     set_triangle,
+    shape_loss,
     triangle_corners,
     unit_normal,
 )
@@ -27,6 +29,7 @@ _MIN_FLIP_COSINE = 0.1  # between normals of triangles after a flip and the mean
 _MAX_FOLD_COSINE = -0.2  # between the normals of the two triangles after a flip
 _MAX_STEP = 0.7  # mean edge lengths at the point
 _MIN_GAIN = 1e-6  # of the energy of the patch, so that of equally good places the first is taken
+_MIN_ACTIVE_GAIN = 1e-3  # of the energy of the patch, from which on a point and its neighbours are looked at again
 _MIN_QUALITY = 0.05  # of a triangle after a move, unless there was a worse one
 
 
@@ -62,23 +65,6 @@ def _shape_target(fit, n, point):
 
 
 @kernel
-def _loss_of_shape(fit, n):
-    """Return the sum of 1 - G over the n triangles of the patch, and their lowest G."""
-    loss, lowest = 0.0, 1.0
-    for k in range(n):
-        a, b, c = triangle_corners(fit, k)
-        g = quality(fit.roots[fit.patch.faces[k]], a, b, c)
-        loss += 1.0 - g
-        lowest = min(lowest, g)
-    return loss, lowest
-
-
-@kernel
-def _set_point(points, point, place):
-    points[point, 0], points[point, 1], points[point, 2] = place
-
-
-@kernel
 def _move(fit, point, price, max_square):
     """Move a point to the best of some places, and return whether it has moved."""
     mesh, patch = fit.mesh, fit.patch
@@ -97,7 +83,7 @@ def _move(fit, point, price, max_square):
         remember_normal(fit, k)
         reach += length(subtract(coordinates(mesh.points, patch.triangles[k, 1]), start)) / n
     error = patch_error(fit, n, m, patch.owners, float("inf"))
-    loss, lowest = _loss_of_shape(fit, n)
+    loss, lowest = shape_loss(fit, n)
     before = error + price * loss
     matrix, right = fit_system(fit, m, patch.owners, point)
     trace = matrix[0] + matrix[3] + matrix[5]
@@ -125,42 +111,44 @@ def _move(fit, point, price, max_square):
         place = (start[0] + step[0], start[1] + step[1], start[2] + step[2])
         if off_samples(fit, m, place, start, max_square):
             continue
-        _set_point(mesh.points, point, place)
-        loss, low = _loss_of_shape(fit, n)
+        set_point(fit, point, place)
+        loss, low = shape_loss(fit, n)
         bound = best - _MIN_GAIN * before
         if price * loss < bound and low >= min(_MIN_QUALITY, lowest):
             error = patch_error(fit, n, m, patch.trial, bound - price * loss)
             if error + price * loss < bound and follows_samples(fit, n, m, patch.trial, _MIN_MOVE_COSINE):
                 best, best_place = error + price * loss, place
-        _set_point(mesh.points, point, start)
+        set_point(fit, point, start)
     moved = best < before
     if moved:
-        _set_point(mesh.points, point, best_place)
+        set_point(fit, point, best_place)
         patch_error(fit, n, m, patch.owners, float("inf"))
+        if best < (1.0 - _MIN_ACTIVE_GAIN) * before:
+            for k in range(n):
+                fit.active[patch.triangles[k, 1]] = 1
+            fit.active[point] = 1
     relist(fit, n, m, patch.owners)
     return moved
 
 
 @kernel
-def move_points(fit, order, price, max_square):
-    """Move points in this order, each to the place that lowers the energy most; return how many have moved.
+def move_points(fit, price, max_square):
+    """Move each active point to the place that lowers the energy most; return how many have moved.
 
     Parameters
     ----------
     fit
-        Mesh and samples.
-    order
-        Points (n,).
+        Mesh and samples. Points that are not worth another look are inactive afterwards.
     price
         Energy of a triangle of quality 0.
     max_square
         Squared distance of a place from the surface, up to which it is allowed in any case.
     """
     count = 0
-    for k in range(len(order)):
-        point = order[k]
-        if fit.freedom[point] > 0 and fit.face_at[point] >= 0 and _move(fit, point, price, max_square):
-            count += 1
+    for point in range(len(fit.freedom)):
+        if fit.active[point] and fit.freedom[point] > 0 and fit.face_at[point] >= 0:
+            fit.active[point] = 0
+            count += _move(fit, point, price, max_square)
     return count
 
 
@@ -180,7 +168,7 @@ def _flip(fit, f, i, price):
     set_triangle(fit, 0, a, x, y)
     set_triangle(fit, 1, b, y, x)
     first, second = remember_normal(fit, 0), remember_normal(fit, 1)
-    loss, _ = _loss_of_shape(fit, 2)
+    loss, _ = shape_loss(fit, 2)
     for k in range(3):
         mean = first * patch.before[0, k] + second * patch.before[1, k]
         patch.before[0, k] = patch.before[1, k] = mean
@@ -213,6 +201,7 @@ def _flip(fit, f, i, price):
             fit.roots[f, row, column] = fit.roots[g, row, column] = mean
     fit.face_at[a] = fit.face_at[x] = fit.face_at[b] = f
     fit.face_at[y] = g
+    fit.active[a] = fit.active[b] = fit.active[x] = fit.active[y] = 1
     relist(fit, 2, m, patch.trial)
     return True
 

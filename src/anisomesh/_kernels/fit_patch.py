@@ -16,11 +16,13 @@ from .vectors import (
     length,
     mapped,
     square_to_triangle,
+    squared_length,
     subtract,
 )
 
 OPPOSED_COSINE = -0.2  # between normals of a sample and a triangle, below which the sample belongs to another sheet
 _OPPOSED_FACTOR = 4.0  # of squared distances to triangles of another sheet; heuristic
+_SMOOTH_COSINE = 0.9  # between the normals of a patch, above which the nearest triangle is the one below; heuristic
 _MIN_SAMPLE_COSINE = 0.3  # between the normal of a triangle and the sum over its samples; heuristic
 _MAX_AREA_FACTOR = 2.0  # area of a triangle over the area that its samples stand for; heuristic
 _AREA_SLACK = 3.0  # samples that this leaves out: a triangle between samples; heuristic
@@ -65,6 +67,10 @@ class Patch(NamedTuple):
         Normals of triangles before a change, of the ones that are looked at, and sums over their samples (n, 3).
     members, owners, trial
         Samples of the faces, and the triangle that each is nearest to, for the best change and for one on trial (m,).
+    other_faces, other_corners
+        Faces and corners of a second point (n,).
+    marks
+        0 for each point (V,) between uses.
     """
 
     faces: Any
@@ -76,6 +82,9 @@ class Patch(NamedTuple):
     members: Any
     owners: Any
     trial: Any
+    other_faces: Any
+    other_corners: Any
+    marks: Any
 
 
 class Fit(NamedTuple):
@@ -93,8 +102,12 @@ class Fit(NamedTuple):
         One of the faces at each point (V,).
     freedom
         0 for points that stay, 1 for points on creases, 2 for others (V,).
+    active
+        1 for points around which something has changed (V,): others are where they are best.
     patch
         Workspace.
+    place
+        Workspace for a point (3,).
     """
 
     mesh: Any
@@ -102,7 +115,9 @@ class Fit(NamedTuple):
     roots: Any
     face_at: Any
     freedom: Any
+    active: Any
     patch: Any
+    place: Any
 
 
 @inlined
@@ -141,14 +156,18 @@ def remember_normal(fit, k):
 
 @kernel
 def gather_members(fit, n):
-    """Write the samples of the first n faces of the patch; return their number, -1 if they exceed the workspace."""
-    members, count = fit.patch.members, 0
+    """Write the samples of the first n faces of the patch, and which face each is on as its owner; return their number.
+
+    The number is -1 if they exceed the workspace.
+    """
+    patch, count = fit.patch, 0
     for k in range(n):
-        sample = fit.samples.first[fit.patch.faces[k]]
+        sample = fit.samples.first[patch.faces[k]]
         while sample >= 0:
-            if count == len(members):
+            if count == len(patch.members):
                 return -1
-            members[count] = sample
+            patch.members[count] = sample
+            patch.owners[count] = k
             count += 1
             sample = fit.samples.following[sample]
     return count
@@ -158,29 +177,40 @@ def gather_members(fit, n):
 def patch_error(fit, n, m, owners, limit):
     """Return the sum of the weighted squared distances of the m members to the n triangles, and write the nearest.
 
-    Beyond the limit the sum is not finished.
+    In a smooth patch a sample whose closest point on its present owner, in ``Patch.owners``, is inside that triangle
+    stays there; others go to the nearest of all triangles. Beyond the limit the sum is not finished.
     """
     patch, samples = fit.patch, fit.samples
-    normals = patch.normals
+    normals, present, smooth = patch.normals, patch.owners, True
     for k in range(n):
         a, b, c = triangle_corners(fit, k)
         normal, _ = unit_normal(a, b, c)
         normals[k, 0], normals[k, 1], normals[k, 2] = normal
+        smooth = smooth and dot(normal, coordinates(normals, 0)) > _SMOOTH_COSINE
     total = 0.0
     for q in range(m):
-        sample = patch.members[q]
+        sample, owner = patch.members[q], present[q]
         p, upright = coordinates(samples.points, sample), coordinates(samples.normals, sample)
-        best, owner = float("inf"), 0
-        for k in range(n):
+        best, searching = float("inf"), True
+        if owner < n and dot(upright, coordinates(normals, owner)) >= OPPOSED_COSINE:
+            a, b, c = triangle_corners(fit, owner)
+            u, v, w = closest_weights(p, a, b, c)
+            offset = combine((u, v, w), subtract(a, p), subtract(b, p), subtract(c, p))
+            best = squared_length(offset)
+            searching = not (smooth and u > 0.0 and v > 0.0 and w > 0.0)
+            if not best >= 0.0:  # a triangle without area
+                best = float("inf")
+        k = 0
+        while searching and k < n:
             a, b, c = triangle_corners(fit, k)
             normal = coordinates(normals, k)
             factor = _OPPOSED_FACTOR if dot(upright, normal) < OPPOSED_COSINE else 1.0
             height = dot(normal, subtract(p, a))
-            if factor * height * height >= best:
-                continue
-            square = factor * square_to_triangle(p, a, b, c)
-            if square < best:
-                best, owner = square, k
+            if factor * height * height < best:
+                square = factor * square_to_triangle(p, a, b, c)
+                if square < best:
+                    best, owner = square, k
+            k += 1
         owners[q] = owner
         total += samples.weights[sample] * best
         if total > limit:
@@ -304,3 +334,22 @@ def _plane_square(fit, m, place):
     samples, nearest = fit.samples, _nearest_member(fit, m, place)
     height = dot(subtract(coordinates(samples.points, nearest), place), coordinates(samples.normals, nearest))
     return height * height
+
+
+@kernel
+def shape_loss(fit, n):
+    """Return the sum of 1 - G over the n triangles of the patch, and their lowest G."""
+    loss, lowest = 0.0, 1.0
+    for k in range(n):
+        a, b, c = triangle_corners(fit, k)
+        g = quality(fit.roots[fit.patch.faces[k]], a, b, c)
+        loss += 1.0 - g
+        lowest = min(lowest, g)
+    return loss, lowest
+
+
+@kernel
+def set_point(fit, point, place):
+    """Move a point to a place."""
+    points = fit.mesh.points
+    points[point, 0], points[point, 1], points[point, 2] = place

@@ -5,7 +5,7 @@ added at their ends.
 """
 
 from .compiled import kernel
-from .triangulation import difference, flip_side, has_edge, replace_neighbour, side_towards, write_face
+from .triangulation import difference, flip_side, has_edge, side_towards, split_side
 from .vectors import cross, dot, length
 
 _MIN_NORMAL_COSINE = 0.8  # between the normal of a new triangle and the area vector of the two; heuristic
@@ -103,30 +103,16 @@ def flip_to_delaunay(mesh, n_stacked, tolerance):
 def _split_side(mesh, n_points, n_faces, f, i):
     """Split side i of a face at its middle, which becomes point ``n_points``; return the new number of faces."""
     g = mesh.neighbours[f, i]
-    fy, fx = (i + 1) % 3, (i + 2) % 3
-    a, x, y, middle = mesh.faces[f, i], mesh.faces[f, fy], mesh.faces[f, fx], n_points
+    x, y = mesh.faces[f, (i + 1) % 3], mesh.faces[f, (i + 2) % 3]
     for k in range(3):
-        mesh.points[middle, k] = 0.5 * (mesh.points[x, k] + mesh.points[y, k])
-    mesh.parents[middle, 0] = x
-    mesh.parents[middle, 1] = y
-    label = mesh.labels[f, i]
-    new_f = n_faces
-    new_g = n_faces + 1 if g >= 0 else -1
-    across, label_across = mesh.neighbours[f, fy], mesh.labels[f, fy]
-    write_face(mesh, new_f, (a, middle, y), (new_g, across, f), (label, label_across, 0))
-    write_face(mesh, f, (a, x, middle), (g, new_f, mesh.neighbours[f, fx]), (label, 0, mesh.labels[f, fx]))
-    replace_neighbour(mesh, across, f, new_f)
-    mesh.deviation[new_f] = mesh.deviation[f]
+        mesh.points[n_points, k] = 0.5 * (mesh.points[x, k] + mesh.points[y, k])
+    mesh.parents[n_points, 0] = x
+    mesh.parents[n_points, 1] = y
+    split_side(mesh, f, i, n_points, n_faces, n_faces + 1)
+    mesh.deviation[n_faces] = mesh.deviation[f]
     if g < 0:
         return n_faces + 1
-    j = side_towards(mesh, g, f)
-    gx, gy = (j + 1) % 3, (j + 2) % 3
-    b = mesh.faces[g, j]
-    across, label_across = mesh.neighbours[g, gy], mesh.labels[g, gy]
-    write_face(mesh, new_g, (b, y, middle), (new_f, g, across), (label, 0, label_across))
-    write_face(mesh, g, (b, middle, x), (f, mesh.neighbours[g, gx], new_g), (label, mesh.labels[g, gx], 0))
-    replace_neighbour(mesh, across, g, new_g)
-    mesh.deviation[new_g] = mesh.deviation[g]
+    mesh.deviation[n_faces + 1] = mesh.deviation[g]
     return n_faces + 2
 
 

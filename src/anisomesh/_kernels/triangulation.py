@@ -144,3 +144,52 @@ def flip_side(mesh, f, i, j):
     write_face(mesh, g, (a, b, y), (across_by, across_ya, f), (label_by, label_ya, 0))
     replace_neighbour(mesh, across_xb, g, f)
     replace_neighbour(mesh, across_ya, f, g)
+
+
+@kernel
+def split_side(mesh, f, i, point, new_f, new_g):
+    """Split side x y of a face a x y at a point: the face becomes a x point, and ``new_f`` a point y.
+
+    The face b y x across becomes b point x, and ``new_g`` b y point; at the boundary ``new_g`` is not used. The halves
+    of the side have its label, the two new sides the label 0.
+    """
+    g = mesh.neighbours[f, i]
+    if g < 0:
+        new_g = -1
+    fy, fx = (i + 1) % 3, (i + 2) % 3
+    a, x, y = mesh.faces[f, i], mesh.faces[f, fy], mesh.faces[f, fx]
+    label = mesh.labels[f, i]
+    across, label_across = mesh.neighbours[f, fy], mesh.labels[f, fy]
+    write_face(mesh, new_f, (a, point, y), (new_g, across, f), (label, label_across, 0))
+    write_face(mesh, f, (a, x, point), (g, new_f, mesh.neighbours[f, fx]), (label, 0, mesh.labels[f, fx]))
+    replace_neighbour(mesh, across, f, new_f)
+    if g < 0:
+        return
+    j = side_towards(mesh, g, f)
+    gx, gy = (j + 1) % 3, (j + 2) % 3
+    b = mesh.faces[g, j]
+    across, label_across = mesh.neighbours[g, gy], mesh.labels[g, gy]
+    write_face(mesh, new_g, (b, y, point), (new_f, g, across), (label, 0, label_across))
+    write_face(mesh, g, (b, point, x), (f, mesh.neighbours[g, gx], new_g), (label, mesh.labels[g, gx], 0))
+    replace_neighbour(mesh, across, g, new_g)
+
+
+@kernel
+def _glue(mesh, face, across, end, other_end, label):
+    """Set what is across a side of a face, given by its ends, and its label; face -1 is none."""
+    if face >= 0:
+        side = 3 - corner_of(mesh, face, end) - corner_of(mesh, face, other_end)
+        mesh.neighbours[face, side] = across
+        mesh.labels[face, side] = label
+
+
+@kernel
+def join_across(mesh, face, point, other):
+    """Remove a face at the collapsing edge: what is across its two other sides become neighbours."""
+    i, j = corner_of(mesh, face, point), corner_of(mesh, face, other)
+    inner, outer = mesh.neighbours[face, j], mesh.neighbours[face, i]
+    label = max(mesh.labels[face, i], mesh.labels[face, j])
+    third = mesh.faces[face, 3 - i - j]
+    _glue(mesh, inner, outer, third, point, label)
+    _glue(mesh, outer, inner, third, other, label)
+    mesh.faces[face, 0] = -1

@@ -8,19 +8,19 @@ import numpy as np
 import numpy.typing as npt
 from scipy.spatial import cKDTree
 
-from anisomesh._arrays import Points
+from anisomesh._arrays import FaceLabels, PointMask, Points
 from anisomesh.deadline import NO_DEADLINE, Deadline
 from anisomesh.features.detect import corners, sharp_edges
 from anisomesh.features.network import FeatureNetwork
-from anisomesh.fitting.fit import FitTask, fit_mesh
+from anisomesh.fitting.fit import FitOptions, fit_mesh
 from anisomesh.fitting.samples import SurfaceSamples, sample_surface
+from anisomesh.fitting.state import FitTask
 from anisomesh.mesh.closest_points import ClosestPoints
 from anisomesh.mesh.surface import Surface
 from anisomesh.mesh.topology import edge_keys
 from anisomesh.mesh.validity import faulty_faces
 from anisomesh.metric.field import MetricField
 
-_MAX_FITS = 4  # of one mesh, with more points held after each
 _SAME_PLACE = 1e-9  # at bounding-box diagonal 1
 _SAMPLES_PER_VERTEX, _MIN_SAMPLES = 40, 10_000  # fewer than 40 are fitted better than the surface between them
 
@@ -100,14 +100,16 @@ class FitTarget:
             held |= cKDTree(self.corners).query(mesh.points)[0] < _SAME_PLACE
         if self.holds_creases:
             held[crease_edges] = True
-        kept = np.isin(edge_keys(mesh.edges), edge_keys(crease_edges))
+        kept = np.zeros(len(mesh.edges), dtype=bool)
+        if self.holds_creases:
+            kept = np.isin(edge_keys(mesh.edges), edge_keys(crease_edges))
         return FitTask(mesh=mesh, held=held, kept=kept, crease_angle=self.crease_angle)
 
 
 def fit_without_faults(
     mesh: Surface, target: FitTarget, *, crease_edges: EdgeEnds, deadline: Deadline = NO_DEADLINE
 ) -> Surface:
-    """Return a mesh fitted to a surface, with no more faults than it had before, and its points in the same order.
+    """Return a mesh fitted to a surface, with as many points and no more faults than it had before.
 
     Parameters
     ----------
@@ -116,28 +118,39 @@ def fit_without_faults(
     target
         The surface.
     crease_edges
-        Ends of edges of the mesh along creases (n, 2), which are not flipped.
+        Ends of edges of the mesh along creases (n, 2), which stay if creases are held.
     deadline
         When to end.
 
     Notes
     -----
-    Points of triangles that are faulty after the fit, and of the triangles around them, are held, and the mesh is
-    fitted again. If it still has faults after four fits, the mesh itself is returned.
+    Where triangles are faulty after the fit, the points of the mesh and the edges between them are held, and the mesh
+    is fitted again: once with exchange of points, then twice without. If faults are left, the mesh itself is returned.
     """
     task = target.task(mesh, crease_edges)
     bound = len(faulty_faces(mesh, target.reference))
-    for _ in range(_MAX_FITS):
-        fitted = fit_mesh(task, target.samples, deadline=deadline)
+    for options in (FitOptions(), FitOptions(), FitOptions(rounds=0), FitOptions(rounds=0)):
+        fitted = fit_mesh(task, target.samples, options, deadline=deadline)
         faulty = faulty_faces(fitted, target.reference)
         if len(faulty) <= bound:
             return fitted
-        at_fault = np.zeros(mesh.n_points, dtype=bool)
-        at_fault[fitted.faces[faulty]] = True
-        around = np.array(at_fault)
-        around[fitted.faces[at_fault[fitted.faces].any(axis=1)]] = True
-        if task.held[around].all():  # the fault is farther away than the triangles next to it
-            around[fitted.faces[around[fitted.faces].any(axis=1)]] = True
-        held = task.held | around
-        task = replace(task, held=held, kept=task.kept | held[mesh.edges].all(axis=1))
+        near = _points_near(mesh, fitted, faulty)
+        if task.held[near].all():
+            near = _with_neighbours(mesh, near)
+        task = replace(task, held=task.held | near, kept=task.kept | near[mesh.edges].all(axis=1))
     return mesh
+
+
+def _points_near(mesh: Surface, fitted: Surface, faces: FaceLabels) -> PointMask:
+    """Return which points of a mesh (V,) are nearest to these faces (n,) of the fitted mesh, and their neighbours."""
+    places = fitted.points[np.unique(fitted.faces[faces])]
+    near = np.zeros(mesh.n_points, dtype=bool)
+    near[cKDTree(mesh.points).query(places)[1]] = True
+    return _with_neighbours(mesh, near)
+
+
+def _with_neighbours(mesh: Surface, chosen: PointMask) -> PointMask:
+    """Return the chosen points (V,) and all points of the faces at them."""
+    grown = np.array(chosen)
+    grown[mesh.faces[chosen[mesh.faces].any(axis=1)]] = True
+    return grown

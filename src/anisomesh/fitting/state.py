@@ -1,0 +1,266 @@
+"""The arrays of a mesh on its way to a fit, and the kernels on them as methods."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+import numpy.typing as npt
+
+from anisomesh._arrays import EdgeMask, FaceLabels, PointMask
+from anisomesh._kernels import fit_exchange, fit_moves, fit_patch, fit_samples
+from anisomesh.features.detect import sharp_edges
+from anisomesh.fitting.samples import SurfaceSamples
+from anisomesh.mesh.closest_points import ClosestPoints
+from anisomesh.mesh.marked_surface import MarkedSurface
+from anisomesh.mesh.surface import Surface
+
+_FACE_ROOM, _SAMPLE_ROOM = 1_024, 65_536  # around a point; points with more stay
+_MIN_RMS = 1e-6  # of the diagonal of the surface: an error that counts as exact
+_MAX_DISTANCE = 5.0  # of a vertex from the surface, in root mean squared errors at the start; heuristic
+_STRIDE = 16  # of the faces whose collapses are looked at to find out what is cheap
+_CHEAP_FACTOR = 4.0  # times as many collapses as are needed are looked at closely; heuristic
+_SLACK = 1.5  # factor of the listed cost of a collapse, up to which it is done when its turn comes; heuristic
+_ALLOWED = 0.5 * fit_exchange.REFUSED
+
+STAYS, SLIDES, FREE = 0, 1, 2  # freedom of points
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class FitTask:
+    """A mesh to be fitted.
+
+    Attributes
+    ----------
+    mesh
+        An oriented manifold mesh near the surface.
+    held
+        Points of the mesh that stay (V,), besides its boundary.
+    kept
+        Edges of the mesh that stay (E,).
+    crease_angle
+        Edges that bend by more degrees are creases, along which points only slide.
+    """
+
+    mesh: Surface
+    held: PointMask
+    kept: EdgeMask
+    crease_angle: float
+
+
+class FitState:
+    """A mesh that is changed in place, with room for more points while it is.
+
+    Parameters
+    ----------
+    task
+        The mesh at the start.
+    samples
+        Samples of the surface that it is fitted to.
+    n_spare
+        Points that it may have more while edges are exchanged.
+
+    Attributes
+    ----------
+    fit
+        The arrays.
+    mean_square
+        Mean squared distance of the samples at the start, at least the one that counts as exact.
+    """
+
+    def __init__(self, task: FitTask, samples: SurfaceSamples, n_spare: int) -> None:
+        self.fit = _arrays(task, samples, n_spare)
+        self._totals = np.zeros(len(self.fit.mesh.faces))
+        self._crease_cosine = float(np.cos(np.radians(task.crease_angle)))
+        self._refresh()
+        self._area = float(samples.weights.sum())
+        self.mean_square = max(self.error / self._area, _MIN_RMS**2)
+        self._max_square = _MAX_DISTANCE**2 * self.mean_square
+
+    @property
+    def error(self) -> float:
+        """Sum of the weighted squared distances of the samples."""
+        return float(fit_samples.fit_error(self.fit))
+
+    @property
+    def mean_triangle_error(self) -> float:
+        """Error at the start for each triangle, at least the one that counts as exact."""
+        return self.mean_square * self._area / max(self._count_faces(), 1)
+
+    @property
+    def mean_quality(self) -> float:
+        """Mean quality G of the triangles."""
+        total, count = fit_samples.quality_sum(self.fit)
+        return float(total / count)
+
+    def energy(self, price: float) -> float:
+        """Return error + price sum (1 - G)."""
+        total, count = fit_samples.quality_sum(self.fit)
+        return float(self.error + price * (count - total))
+
+    def sweep(self, price: float) -> None:
+        """Move all active points and flip edges once."""
+        self.move(price)
+        self.flip(price)
+        self._refresh()
+
+    def move(self, price: float) -> int:
+        """Move all active points, and return how many have moved."""
+        return int(fit_moves.move_points(self.fit, price, self._max_square))
+
+    def flip(self, price: float) -> int:
+        """Flip edges once, and return how many were flipped."""
+        return int(fit_moves.flip_edges(self.fit, price))
+
+    def wake(self) -> None:
+        """Make all points active."""
+        self.fit.active[:] = 1
+
+    def split(self, price: float, count: int) -> int:
+        """Split up to ``count`` edges that lower the energy, and return how many; two triangles more cost nothing.
+
+        Every mesh with as many points has as many triangles, so what two triangles of mean quality add to the energy is
+        left out.
+        """
+        fit = self.fit
+        points = np.flatnonzero(fit.face_at < 0)[:count].astype(np.int32)
+        faces = np.flatnonzero(fit.mesh.faces[:, 0] < 0)[: 2 * count].astype(np.int32)
+        gains = np.empty((len(fit.mesh.faces), 3))
+        fit_exchange.split_gains(fit, price, self._max_square, points[0], gains)
+        largest = 2.0 * price * (1.0 - self.mean_quality)
+        sides = _cheapest(gains, largest)
+        settings = price, self._max_square, self._crease_cosine, largest
+        touched = np.zeros(len(fit.freedom), dtype=np.uint8)
+        done = int(fit_exchange.split_edges(fit, sides, settings, points, faces, touched))
+        self._refresh()
+        return done
+
+    def collapse(self, price: float, count: int) -> int:
+        """Collapse up to ``count`` edges, the ones that raise the energy least, and return how many."""
+        fit, done = self.fit, 0
+        costs = np.full((len(fit.mesh.faces), 3), fit_exchange.REFUSED)
+        limit = self._cheap(price, count, costs)
+        while done < count:
+            fit_exchange.collapse_costs(fit, price, self._max_square, limit, 1, costs)
+            sides = _cheapest(costs, limit)
+            listed = costs.ravel()[sides]
+            limits = np.where(listed > 0.0, _SLACK * listed, listed / _SLACK)
+            before, now = done, 1
+            while now > 0 and done < count:
+                settings, touched = (price, self._max_square, count - done), np.zeros(len(fit.freedom), dtype=np.uint8)
+                now = int(fit_exchange.collapse_edges(fit, sides, limits, settings, touched))
+                done += now
+            if done == before and limit == _ALLOWED:
+                break
+            limit = limit if done > before else _ALLOWED
+        self._refresh()
+        return done
+
+    def _cheap(self, price: float, count: int, costs: npt.NDArray[np.float64]) -> float:
+        """Return a cost below which there are probably enough collapses, from some of all; ``costs`` is workspace."""
+        fit_exchange.collapse_costs(self.fit, price, self._max_square, _ALLOWED, _STRIDE, costs)
+        some = np.sort(costs[costs < _ALLOWED])
+        position = int(_CHEAP_FACTOR * count / max(self._count_faces(), 1) * len(some)) + 1
+        return max(float(some[position]), 0.0) + price if position < len(some) else _ALLOWED
+
+    def saved(self) -> list[npt.NDArray[np.generic]]:
+        """Return copies of all arrays that change."""
+        return [array.copy() for array in self._changing()]
+
+    def restore(self, saved: list[npt.NDArray[np.generic]]) -> None:
+        """Go back to arrays that were saved."""
+        for array, before in zip(self._changing(), saved, strict=True):
+            array[...] = before
+
+    def surface(self) -> Surface:
+        """Return the mesh; without exchange its points are the ones of the start, in their order."""
+        mesh = self.fit.mesh
+        used, position = np.unique(mesh.faces[mesh.faces[:, 0] >= 0], return_inverse=True)
+        return Surface(mesh.points[used], position.reshape(-1, 3).astype(np.int32))
+
+    def _changing(self) -> list[npt.NDArray[np.generic]]:
+        fit = self.fit
+        mesh, samples = fit.mesh, fit.samples
+        lists = [samples.first, samples.following, samples.owner]
+        return [mesh.points, mesh.faces, mesh.neighbours, mesh.labels, *lists, fit.roots, fit.face_at, fit.freedom]
+
+    def _count_faces(self) -> int:
+        return int(np.count_nonzero(self.fit.mesh.faces[:, 0] >= 0))
+
+    def _refresh(self) -> None:
+        """Move samples to the nearest faces, and take the metric of the faces from them."""
+        fit_samples.walk_samples(self.fit)
+        fit_samples.average_roots(self.fit, self._totals)
+
+
+def _cheapest(values: npt.NDArray[np.float64], limit: float) -> npt.NDArray[np.int64]:
+    """Return the sides, as 3 face + side (n,), with values (F, 3) below a limit, the lowest first."""
+    sides = np.flatnonzero(values.ravel() < limit)
+    return sides[np.argsort(values.ravel()[sides], kind="stable")].astype(np.int64)
+
+
+def _arrays(task: FitTask, samples: SurfaceSamples, n_spare: int) -> fit_patch.Fit:
+    """Return the arrays of a fit, every sample on the face nearest to it."""
+    mesh = task.mesh
+    n_points, n_faces = mesh.n_points + 2 * n_spare, mesh.n_faces + 2 * n_spare
+    triangulation = MarkedSurface.unmoved(mesh, task.kept.astype(np.int32)).triangulation(n_faces)
+    triangulation.faces[mesh.n_faces :] = -1
+    creases = sharp_edges(mesh, task.crease_angle) | task.kept
+    freedom = np.full(n_points, FREE, dtype=np.uint8)
+    freedom[mesh.edges[creases]] = SLIDES
+    freedom[: mesh.n_points][task.held | mesh.on_boundary] = STAYS
+    face_at = np.full(n_points, -1, dtype=np.int32)
+    face_at[mesh.faces] = np.arange(mesh.n_faces, dtype=np.int32)[:, None]
+    faces, corners, other_faces, other_corners = np.zeros((4, _FACE_ROOM), dtype=np.int32)
+    before, normals, sums = np.zeros((3, _FACE_ROOM, 3))
+    members, owners, trial = np.zeros((3, _SAMPLE_ROOM), dtype=np.int32)
+    return fit_patch.Fit(
+        mesh=triangulation,
+        samples=fit_patch.Samples(
+            points=samples.points,
+            normals=samples.normals,
+            weights=samples.weights,
+            roots=samples.roots,
+            first=np.full(n_faces, -1, dtype=np.int32),
+            following=np.full(samples.count, -1, dtype=np.int32),
+            owner=_nearest_faces(mesh, samples),
+        ),
+        roots=np.tile(np.eye(3), (n_faces, 1, 1)),
+        face_at=face_at,
+        freedom=freedom,
+        active=np.ones(n_points, dtype=np.uint8),
+        patch=fit_patch.Patch(
+            faces=faces,
+            corners=corners,
+            triangles=np.zeros((_FACE_ROOM, 3), dtype=np.int32),
+            before=before,
+            normals=normals,
+            sums=sums,
+            members=members,
+            owners=owners,
+            trial=trial,
+            other_faces=other_faces,
+            other_corners=other_corners,
+            marks=np.zeros(n_points, dtype=np.uint8),
+        ),
+        place=np.zeros(3),
+    )
+
+
+def _nearest_faces(mesh: Surface, samples: SurfaceSamples) -> FaceLabels:
+    """Return the face (S,) nearest to each sample, if possible one that faces its way."""
+    closest = ClosestPoints(mesh)
+    face, weights = closest.locate(samples.points)
+    opposed = np.flatnonzero(_cosines(mesh, face, samples.normals) < 0.0)
+    place = np.einsum("nc,ncx->nx", weights[opposed], mesh.points[mesh.faces[face[opposed]]])
+    distance = np.linalg.norm(samples.points[opposed] - place, axis=1)
+    outside = samples.points[opposed] + 2.0 * distance[:, None] * samples.normals[opposed]
+    other = closest.locate(outside)[0]
+    agrees = _cosines(mesh, other, samples.normals[opposed]) > 0.0
+    face[opposed[agrees]] = other[agrees]
+    return face.astype(np.int32)
+
+
+def _cosines(mesh: Surface, face: npt.NDArray[np.int64], normals: npt.NDArray[np.float64]) -> npt.NDArray[np.float64]:
+    """Return the cosines (n,) between the normals of faces (n,) and unit vectors (n, 3)."""
+    return np.asarray(np.einsum("nx,nx->n", mesh.face_normals[face], normals))
