@@ -8,9 +8,19 @@ from anisomesh.cvt.lbfgs import Optimised, Status
 from anisomesh.delaunay.meshing import ValidMesh
 from anisomesh.mesh.validity import Validity
 from anisomesh.options import RemeshOptions
+from anisomesh.repair.prepare import PrepareReport
 from anisomesh.resolve import embedding_name
 
 COUNT_TOLERANCE = 0.02  # share of the vertices asked for by which a result may differ without a remark
+
+
+def losses_of_repair(report: PrepareReport) -> Iterator[str]:
+    """Yield one sentence for everything that the repair of the input has taken apart."""
+    if report.edges_nonmanifold_cut:
+        count = report.edges_nonmanifold_cut
+        yield f"the sheets that meet at {count:,} edges with more than two faces are separate in the result"
+    if report.edges_nonorientable_cut:
+        yield f"the surface has one side only, and was cut open along {report.edges_nonorientable_cut:,} edges"
 
 
 def caveats(

@@ -72,7 +72,8 @@ class RemeshOptions:
     threads
         Worker threads; they do not change the result.
     lloyd_iterations, max_iterations
-        Iterations of Lloyd's algorithm at the start and bound on those of L-BFGS after it.
+        Iterations of Lloyd's algorithm at the start, and the bound on iterations of L-BFGS after it; by default 75 if
+        the mesh is fitted, which makes more of them useless, and else 150.
     embedding_iterations
         Bound on the local/global steps of the direct embedding.
     weld_tolerance
@@ -101,7 +102,7 @@ class RemeshOptions:
     seed: int = 0
     threads: int = 2
     lloyd_iterations: int = 9
-    max_iterations: int = 150
+    max_iterations: int | None = None
     embedding_iterations: int = 10
     weld_tolerance: float = 0.0
     feature_angle: float = 40.0
@@ -136,6 +137,8 @@ class RemeshOptions:
             if not (value is None and name in _OPTIONAL_NUMBERS):
                 object.__setattr__(self, name, real_number(name, value))
         for name, low in _LEAST.items():
+            if name == "max_iterations" and self.max_iterations is None:
+                continue
             object.__setattr__(self, name, whole_number(name, getattr(self, name), low))
 
     def _check_stages(self) -> None:

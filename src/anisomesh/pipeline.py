@@ -13,7 +13,7 @@ import numpy.typing as npt
 
 from anisomesh._arrays import EdgeMask, PointMask
 from anisomesh._values import real_number, whole_number
-from anisomesh.caveats import caveats
+from anisomesh.caveats import caveats, losses_of_repair
 from anisomesh.cvt.lbfgs import Optimised
 from anisomesh.cvt.schedule import DualFeedback, optimise_sites
 from anisomesh.deadline import Deadline
@@ -179,7 +179,10 @@ def _remesh(source: PreparedInput, n: int, options: RemeshOptions, run: _Run) ->
         seed=made.seed,
         validity=validity,
         seconds=run.total_seconds(),
-        warnings=tuple(caveats(n, field.noise, mesh, validity, optimised, options)),
+        warnings=(
+            *losses_of_repair(prepared.report),
+            *caveats(n, field.noise, mesh, validity, optimised, options),
+        ),
     )
 
 

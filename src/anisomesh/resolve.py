@@ -24,6 +24,7 @@ Noise turns all edges, so measured surfaces have next to none; machine parts hav
 """
 
 _RESAMPLING_FACTOR = 1.5  # sharpness of the energy by which sites are sampled anew, over the sharpness; heuristic
+_ITERATIONS = {True: 75, False: 150}  # of L-BFGS, with a fit at the end and without; from training meshes
 _BUILT_IN: dict[str, Callable[[float], MetricSource]] = {
     "curvature": lambda crease_angle: Curvature(crease_angle=crease_angle),
     "approximation": lambda crease_angle: Approximation(crease_angle=crease_angle),
@@ -102,6 +103,6 @@ def cvt_options(options: RemeshOptions) -> CVTOptions:
         resampling_energy=resampling,
         relocate=follows_creases(options),
         lloyd_iterations=options.lloyd_iterations,
-        max_iterations=options.max_iterations,
+        max_iterations=_ITERATIONS[options.fit] if options.max_iterations is None else options.max_iterations,
         seed=options.seed,
     )

@@ -7,6 +7,7 @@ from .fit_patch import (
     gather_members,
     off_samples,
     patch_error,
+    quadric_value,
     relist,
     remember_normal,
     set_point,
@@ -152,7 +153,7 @@ def split_edges(fit, sides, settings, free_points, free_faces, touched):
 
 
 @kernel
-def _may_collapse(fit, gone, into, n_gone, n_into):
+def _may_collapse(fit, n_gone, n_into):
     """Return whether an edge may be collapsed: the two points have no common neighbours but the two across it."""
     mesh, patch, marks = fit.mesh, fit.patch, fit.patch.marks
     for k in range(n_into):
@@ -172,53 +173,69 @@ def _may_collapse(fit, gone, into, n_gone, n_into):
 
 
 @kernel
-def _collapse(fit, f, i, forwards, price, max_square, limit):
-    """Return what a collapse of side i of a face changes the energy by, if that is below a limit.
+def _collapse_patch(fit, f, i):
+    """Write the triangles around side i of a face, and return their number but for the two that a collapse removes.
 
-    Side x y of the face: y goes into x, or x into y if ``forwards``. The triangles after the collapse, their samples
-    and owners stay in the workspace, and the point at its best place; the second number is of triangles, the third of
-    samples.
+    Also returned are the number of triangles that get another corner, which come first, the point that goes, and the
+    one that it goes into. The first number is 0 if the edge may not be collapsed. The two triangles come last.
     """
     mesh, patch = fit.mesh, fit.patch
     at_into, at_gone = (i + 1) % 3, (i + 2) % 3
-    if forwards:
+    if _first_goes(fit, f, i):
         at_into, at_gone = at_gone, at_into
     into, gone = mesh.faces[f, at_into], mesh.faces[f, at_gone]
-    if fit.freedom[gone] == 0 or (fit.freedom[gone] < fit.freedom[into]):
-        return REFUSED, 0, 0
+    if fit.freedom[gone] == 0:
+        return 0, 0, gone, into
     n_gone, closed = faces_around(mesh, f, at_gone, patch.faces, patch.corners)
     n_into, _ = faces_around(mesh, f, at_into, patch.other_faces, patch.other_corners)
     if not closed or n_into < 0 or n_gone < 3 or n_gone + n_into > len(patch.faces) or n_gone + n_into < 7:
-        return REFUSED, 0, 0
-    if not _may_collapse(fit, gone, into, n_gone, n_into):
-        return REFUSED, 0, 0
-    n = total = 0
-    g = mesh.neighbours[f, i]
-    for k in range(n_gone):  # faces that stay come first
-        face = patch.faces[k]
-        if face != f and face != g:
-            patch.faces[n] = face
+        return 0, 0, gone, into
+    if not _may_collapse(fit, n_gone, n_into):
+        return 0, 0, gone, into
+    n, g = 0, mesh.neighbours[f, i]
+    for k in range(n_gone):
+        if patch.faces[k] != f and patch.faces[k] != g:
+            patch.faces[n] = patch.faces[k]
             n += 1
-    from_gone = n
+    n_changed = n
     for k in range(n_into):
-        face = patch.other_faces[k]
-        if face != f and face != g:
-            patch.faces[n] = face
+        if patch.other_faces[k] != f and patch.other_faces[k] != g:
+            patch.faces[n] = patch.other_faces[k]
             n += 1
     patch.faces[n], patch.faces[n + 1] = f, g
-    total = n + 2
-    for k in range(total):
+    for k in range(n + 2):
         face = patch.faces[k]
         set_triangle(fit, k, mesh.faces[face, 0], mesh.faces[face, 1], mesh.faces[face, 2])
+    return n, n_changed, gone, into
+
+
+@kernel
+def _replace_corners(fit, n, gone, into):
+    """Put one point in the place of another in the first n triangles of the patch."""
+    for k in range(n):
+        for corner in range(3):
+            if fit.patch.triangles[k, corner] == gone:
+                fit.patch.triangles[k, corner] = into
+
+
+@kernel
+def _collapse(fit, f, i, price, max_square, limit):
+    """Return what a collapse of side i of a face changes the energy by, if that is below a limit.
+
+    The triangles after the collapse and their samples stay in the workspace, and the best place of the point in
+    ``fit.place``; the second number is of triangles, the third of samples.
+    """
+    mesh, patch = fit.mesh, fit.patch
+    n, n_changed, gone, into = _collapse_patch(fit, f, i)
+    if n == 0:
+        return REFUSED, 0, 0
+    for k in range(n + 2):
         remember_normal(fit, k)
-    m = gather_members(fit, total)
+    m = gather_members(fit, n + 2)
     if m <= 0:
         return REFUSED, 0, 0
-    before = patch_error(fit, total, m, patch.owners, REFUSED) + price * shape_loss(fit, total)[0]
-    for k in range(from_gone):
-        for corner in range(3):
-            if patch.triangles[k, corner] == gone:
-                patch.triangles[k, corner] = into
+    before = patch_error(fit, n + 2, m, patch.owners, REFUSED) + price * shape_loss(fit, n + 2)[0]
+    _replace_corners(fit, n_changed, gone, into)
     start, end = coordinates(mesh.points, into), coordinates(mesh.points, gone)
     middle = subtract_share(start, -0.5, subtract(end, start))
     best, best_place, found = before + limit, start, False
@@ -250,23 +267,43 @@ def _collapse(fit, f, i, forwards, price, max_square, limit):
 
 
 @kernel
-def collapse_costs(fit, price, max_square, limit, stride, costs):
-    """Write what a collapse of the sides of every ``stride``-th face changes the energy by (F, 3), up to a limit.
+def collapse_estimates(fit, price, quadrics, estimates):
+    """Write about what a collapse of every side changes the energy by (F, 3): sides of lower faces, others are refused.
 
-    Sides of lower faces, and nothing for others. The free end of an edge goes, the one with the larger number if both
-    are free to the same degree; see :func:`collapse_edges`.
+    The error is estimated by the quadrics of the faces around the point that goes, at the point that it goes into.
+
+    References
+    ----------
+    Garland, Heckbert, "Surface simplification using quadric error metrics", 1997.
     """
-    for face in range(0, len(costs), stride):
+    mesh, patch = fit.mesh, fit.patch
+    for face in range(len(estimates)):
         for side in range(3):
-            costs[face, side] = REFUSED
-            if fit.mesh.faces[face, 0] >= 0 and face < fit.mesh.neighbours[face, side]:
-                forwards = _goes_forwards(fit, face, side)
-                costs[face, side] = _collapse(fit, face, side, forwards, price, max_square, limit)[0]
+            estimates[face, side] = REFUSED
+            if mesh.faces[face, 0] < 0 or face > mesh.neighbours[face, side]:
+                continue
+            n, n_changed, gone, into = _collapse_patch(fit, face, side)
+            if n == 0:
+                continue
+            change = -price * shape_loss(fit, n + 2)[0]
+            place = coordinates(mesh.points, into)
+            for k in range(n + 2):
+                if k < n_changed or k >= n:
+                    change += quadric_value(quadrics[patch.faces[k]], place)
+            _replace_corners(fit, n_changed, gone, into)
+            estimates[face, side] = change + price * shape_loss(fit, n)[0]
 
 
 @kernel
-def _goes_forwards(fit, f, i):
-    """Return whether the end of side i of a face that goes in a collapse is the first one."""
+def collapse_costs(fit, sides, price, max_square, costs):
+    """Write what a collapse of some sides, 3 face + side (n,), changes the energy by (n,)."""
+    for k in range(len(sides)):
+        costs[k] = _collapse(fit, sides[k] // 3, sides[k] % 3, price, max_square, REFUSED)[0]
+
+
+@kernel
+def _first_goes(fit, f, i):
+    """Return whether the first end of side i of a face goes in a collapse: the freer one, or the one added later."""
     x, y = fit.mesh.faces[f, (i + 1) % 3], fit.mesh.faces[f, (i + 2) % 3]
     if fit.freedom[x] != fit.freedom[y]:
         return fit.freedom[x] > fit.freedom[y]
@@ -302,11 +339,10 @@ def collapse_edges(fit, sides, limits, settings, touched):
         x, y = mesh.faces[f, (i + 1) % 3], mesh.faces[f, (i + 2) % 3]
         if touched[x] or touched[y]:
             continue
-        forwards = _goes_forwards(fit, f, i)
-        change, n, m = _collapse(fit, f, i, forwards, price, max_square, limits[k])
+        gone, into = (x, y) if _first_goes(fit, f, i) else (y, x)
+        change, n, m = _collapse(fit, f, i, price, max_square, limits[k])
         if not change < limits[k]:
             continue
-        gone, into = (x, y) if forwards else (y, x)
         g = mesh.neighbours[f, i]
         set_point(fit, into, coordinates_of(fit.place))
         patch_error(fit, n, m, patch.owners, REFUSED)

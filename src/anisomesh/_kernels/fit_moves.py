@@ -208,12 +208,12 @@ def _flip(fit, f, i, price):
 
 @kernel
 def flip_edges(fit, price):
-    """Flip edges once over all faces where that lowers the energy; return how many were flipped."""
-    count = 0
+    """Flip edges of faces with an active point, once, where that lowers the energy; return how many were flipped."""
+    count, faces = 0, fit.mesh.faces
     for face in range(len(fit.roots)):
-        side = 0
-        while side < 3 and fit.mesh.faces[face, 0] >= 0:
-            if _flip(fit, face, side, price):
-                count += 1
-            side += 1
+        if faces[face, 0] < 0:
+            continue
+        for side in range(3):
+            if fit.active[faces[face, 0]] or fit.active[faces[face, 1]] or fit.active[faces[face, 2]]:
+                count += _flip(fit, face, side, price)
     return count

@@ -18,8 +18,7 @@ from anisomesh.mesh.surface import Surface
 _FACE_ROOM, _SAMPLE_ROOM = 1_024, 65_536  # around a point; points with more stay
 _MIN_RMS = 1e-6  # of the diagonal of the surface: an error that counts as exact
 _MAX_DISTANCE = 5.0  # of a vertex from the surface, in root mean squared errors at the start; heuristic
-_STRIDE = 16  # of the faces whose collapses are looked at to find out what is cheap
-_CHEAP_FACTOR = 4.0  # times as many collapses as are needed are looked at closely; heuristic
+_CHEAP_FACTOR = 8  # times as many collapses as are needed are looked at closely; heuristic
 _SLACK = 1.5  # factor of the listed cost of a collapse, up to which it is done when its turn comes; heuristic
 _ALLOWED = 0.5 * fit_exchange.REFUSED
 
@@ -136,32 +135,29 @@ class FitState:
         return done
 
     def collapse(self, price: float, count: int) -> int:
-        """Collapse up to ``count`` edges, the ones that raise the energy least, and return how many."""
+        """Collapse up to ``count`` edges, the ones that raise the energy least, and return how many.
+
+        Edges are looked at closely in the order of what their quadrics say.
+        """
         fit, done = self.fit, 0
-        costs = np.full((len(fit.mesh.faces), 3), fit_exchange.REFUSED)
-        limit = self._cheap(price, count, costs)
-        while done < count:
-            fit_exchange.collapse_costs(fit, price, self._max_square, limit, 1, costs)
-            sides = _cheapest(costs, limit)
-            listed = costs.ravel()[sides]
-            limits = np.where(listed > 0.0, _SLACK * listed, listed / _SLACK)
-            before, now = done, 1
+        quadrics, estimates = np.empty((len(fit.mesh.faces), 10)), np.empty((len(fit.mesh.faces), 3))
+        fit_samples.face_quadrics(fit, quadrics)
+        fit_exchange.collapse_estimates(fit, price, quadrics, estimates)
+        candidates, n_looked = _cheapest(estimates, _ALLOWED), _CHEAP_FACTOR * count
+        while done < count and len(candidates):
+            sides, candidates = candidates[:n_looked], candidates[n_looked:]
+            costs = np.empty(len(sides))
+            fit_exchange.collapse_costs(fit, sides, price, self._max_square, costs)
+            order = np.argsort(costs, kind="stable")
+            order = order[costs[order] < _ALLOWED]
+            limits = np.where(costs > 0.0, _SLACK * costs, costs / _SLACK)[order]
+            now = 1
             while now > 0 and done < count:
                 settings, touched = (price, self._max_square, count - done), np.zeros(len(fit.freedom), dtype=np.uint8)
-                now = int(fit_exchange.collapse_edges(fit, sides, limits, settings, touched))
+                now = int(fit_exchange.collapse_edges(fit, sides[order], limits, settings, touched))
                 done += now
-            if done == before and limit == _ALLOWED:
-                break
-            limit = limit if done > before else _ALLOWED
         self._refresh()
         return done
-
-    def _cheap(self, price: float, count: int, costs: npt.NDArray[np.float64]) -> float:
-        """Return a cost below which there are probably enough collapses, from some of all; ``costs`` is workspace."""
-        fit_exchange.collapse_costs(self.fit, price, self._max_square, _ALLOWED, _STRIDE, costs)
-        some = np.sort(costs[costs < _ALLOWED])
-        position = int(_CHEAP_FACTOR * count / max(self._count_faces(), 1) * len(some)) + 1
-        return max(float(some[position]), 0.0) + price if position < len(some) else _ALLOWED
 
     def saved(self) -> list[npt.NDArray[np.generic]]:
         """Return copies of all arrays that change."""

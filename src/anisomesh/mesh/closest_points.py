@@ -13,6 +13,7 @@ from anisomesh._arrays import FaceMask, FaceVectors, Points
 from anisomesh.mesh.geometry import corner_angles, unit
 from anisomesh.mesh.intersections import Pairs, self_intersections
 from anisomesh.mesh.surface import Surface
+from anisomesh.mesh.topology import edge_keys
 
 _ON_SIDE_WEIGHT = 1e-6  # barycentric coordinate below which a point lies on a side; heuristic, far above rounding
 _QUERIES_PER_BLOCK = 16_384  # bounds the temporary arrays of `locate` to a few megabytes
@@ -148,9 +149,19 @@ class ClosestPoints:
 
     @cached_property
     def crossing_facets(self) -> ClosestPoints | None:
-        """Closest points of the facets that intersect others, or None if there are none."""
-        facets = np.unique(self.intersecting_pairs)
+        """Closest points of the facets that intersect others or touch them along an edge, or None if there are none."""
+        facets = np.union1d(self.intersecting_pairs, self._touching_facets)
         return ClosestPoints(Surface(self.surface.points, self.surface.faces[facets])) if len(facets) else None
+
+    @cached_property
+    def _touching_facets(self) -> Facets:
+        """Facets (n,) with an edge that lies on an edge between other points, as where a non-manifold edge was cut."""
+        surface = self.surface
+        place = np.unique(surface.points, axis=0, return_inverse=True)[1].reshape(-1)
+        keys = edge_keys(place[surface.edges])
+        _, which, count = np.unique(keys, return_inverse=True, return_counts=True)
+        touching = surface.edge_faces[count[which.reshape(-1)] > 1]
+        return np.unique(touching[touching >= 0]).astype(np.int64)
 
     @cached_property
     def _opposite_facets(self) -> csr_array:
