@@ -24,6 +24,7 @@ if TYPE_CHECKING:
     from anisomesh.errors import AnisomeshError, MeshError, MeshFileError, MetricError, OptionError
     from anisomesh.evaluation.report import Evaluation, evaluate
     from anisomesh.features.network import trace_features
+    from anisomesh.fitting.target import FitTarget, fit_without_faults
     from anisomesh.io.meshes import load, save
     from anisomesh.learn.inference.source import Hybrid, Neural
     from anisomesh.mesh.embedded_surface import EmbeddedSurface
@@ -77,6 +78,8 @@ _MODULE_OF = {
     "optimise_sites": "cvt.schedule",
     "MeshingTask": "delaunay.meshing",
     "mesh_from_sites": "delaunay.meshing",
+    "FitTarget": "fitting.target",
+    "fit_without_faults": "fitting.target",
     # conformance tests of plug-ins
     "check_metric_source": "conformance",
     "check_embedder": "conformance",
@@ -101,6 +104,7 @@ __all__ = [
     "Embedding",
     "EnergyValue",
     "Evaluation",
+    "FitTarget",
     "Hybrid",
     "MeshError",
     "MeshFileError",
@@ -122,6 +126,7 @@ __all__ = [
     "check_metric_source",
     "energy_from_kernel",
     "evaluate",
+    "fit_without_faults",
     "load",
     "mesh_from_sites",
     "optimise_sites",

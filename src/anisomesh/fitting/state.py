@@ -19,7 +19,7 @@ _FACE_ROOM, _SAMPLE_ROOM = 1_024, 65_536  # around a point; points with more sta
 _MIN_RMS = 1e-6  # of the diagonal of the surface: an error that counts as exact
 _MAX_DISTANCE = 5.0  # of a vertex from the surface, in root mean squared errors at the start; heuristic
 _CHEAP_FACTOR = 8  # times as many collapses as are needed are looked at closely; heuristic
-_SLACK = 1.5  # factor of the listed cost of a collapse, up to which it is done when its turn comes; heuristic
+_LISTED_SLACK = 1.5  # factor of the listed cost of a collapse, up to which it is done when its turn comes; heuristic
 _ALLOWED = 0.5 * fit_exchange.REFUSED
 
 STAYS, SLIDES, FREE = 0, 1, 2  # freedom of points
@@ -150,7 +150,7 @@ class FitState:
             fit_exchange.collapse_costs(fit, sides, price, self._max_square, costs)
             order = np.argsort(costs, kind="stable")
             order = order[costs[order] < _ALLOWED]
-            limits = np.where(costs > 0.0, _SLACK * costs, costs / _SLACK)[order]
+            limits = np.where(costs > 0.0, _LISTED_SLACK * costs, costs / _LISTED_SLACK)[order]
             now = 1
             while now > 0 and done < count:
                 settings, touched = (price, self._max_square, count - done), np.zeros(len(fit.freedom), dtype=np.uint8)
