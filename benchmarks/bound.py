@@ -2,10 +2,10 @@
 
 Usage: python benchmarks/bound.py [--vertices 500 1000 2000]
 
-The root mean squared distance of a continuous piecewise linear surface with triangles of area A from a patch of Gaussian
-curvature K is at best A sqrt(|K| / 180) for K > 0 and A sqrt(|K| / 90) for K < 0, without being tied to the surface at its
-vertices. With the best density of triangles that is sqrt(I^3 / S) / n for n triangles on a surface of area S, where I is
-the integral of (c |K|)^(1/3) with c = 1/180 or 1/90. It is an asymptotic bound: with few triangles a mesh can be below it.
+The root mean squared distance of a continuous piecewise linear surface with triangles of area A from a patch of
+Gaussian curvature K is at best A sqrt(|K| / 180) for K > 0 and A sqrt(|K| / 90) for K < 0, without being tied to the
+surface at its vertices. With the best density of triangles that is sqrt(I^3 / S) / n for n triangles on a surface of
+area S, where I is the integral of (c |K|)^(1/3) with c = 1/180 or 1/90. The bound is asymptotic.
 """
 
 from __future__ import annotations
@@ -30,7 +30,7 @@ FINE_SAMPLES = 200_000
 
 
 def least_rms(shape: Surface, n_faces: int) -> float:
-    """Return the bound for a number of triangles, in model units, from the angle defects of a fine mesh of the shape."""
+    """Return the bound for a number of triangles, in model units, from the angle defects of a fine mesh."""
     angles = np.bincount(shape.faces.ravel(), corner_angles(shape.points[shape.faces]).ravel())
     area = np.bincount(shape.faces.ravel(), np.repeat(shape.face_areas / 3.0, 3))
     curvature = (2.0 * np.pi - angles) / area

@@ -16,7 +16,7 @@ from anisomesh.mesh.marked_surface import MarkedSurface
 from anisomesh.mesh.surface import Surface
 
 _FACE_ROOM, _SAMPLE_ROOM = 1_024, 65_536  # around a point; points with more stay
-_MIN_RMS = 1e-6  # of the diagonal of the surface: an error that counts as exact
+_MIN_RMS = 1e-8  # of the diagonal of the surface: an error that counts as exact
 _MAX_DISTANCE = 5.0  # of a vertex from the surface, in root mean squared errors at the start; heuristic
 _CHEAP_FACTOR = 8  # times as many collapses as are needed are looked at closely; heuristic
 _LISTED_SLACK = 1.5  # factor of the listed cost of a collapse, up to which it is done when its turn comes; heuristic

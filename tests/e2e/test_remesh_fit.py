@@ -1,0 +1,50 @@
+"""The fit at the end of a remesh: nearer to the input, better triangles, as valid as without it."""
+
+import numpy as np
+import pytest
+
+import anisomesh
+from anisomesh.shapes import analytic as shapes
+from anisomesh.shapes.cad_part import cad_part
+
+SHAPES = {
+    "ellipsoid": (lambda: shapes.ellipsoid(subdivisions=4), 200),
+    "part": (lambda: cad_part(10), 300),
+    "open patch": (lambda: shapes.open_patch(lambda x, y: 0.3 * np.sin(4 * x) * y, n=40), 150),
+}
+
+
+@pytest.mark.parametrize("name", SHAPES)
+def test_a_fit_lowers_the_error_and_improves_triangles(name):
+    make, n = SHAPES[name]
+    shape = make()
+    plain, fitted = (anisomesh.remesh(shape, n_vertices=n, embedding="direct", fit=fit) for fit in (False, True))
+    before, after = (anisomesh.evaluate(shape, result.surface, samples=20_000) for result in (plain, fitted))
+    assert after.distance.rms < 0.8 * before.distance.rms
+    assert after.shape.g_mean > before.shape.g_mean
+    assert after.features.crease_covered >= before.features.crease_covered - 0.01
+    assert after.features.corners_kept >= before.features.corners_kept
+    assert fitted.surface.n_points == plain.surface.n_points == n
+    for fault in ("flat", "inverted", "new_intersections", "nonmanifold_edges", "nonmanifold_vertices"):
+        assert getattr(fitted.validity, fault) <= getattr(plain.validity, fault)
+    assert fitted.validity.euler == plain.validity.euler
+    assert fitted.seconds["fit"] > 0.0
+
+
+def test_prescribed_edges_stay_on_their_lines():
+    sheet = shapes.open_patch(lambda x, y: 0.0 * x, n=20)
+    line = np.flatnonzero(np.abs(sheet.points[:, 0] - np.median(np.unique(sheet.points[:, 0]))) < 1e-9)
+    line = line[np.argsort(sheet.points[line, 1])]
+    pairs = np.stack([line[:-1], line[1:]], axis=1)
+    result = anisomesh.remesh(sheet, n_vertices=120, embedding="direct", features=pairs)
+    ends = result.surface.points[result.surface.edges]
+    on_line = (np.abs(ends[:, :, 0] - sheet.points[line[0], 0]) < 1e-9).all(axis=1)
+    covered = np.linalg.norm(ends[on_line, 0] - ends[on_line, 1], axis=1).sum()
+    whole = np.ptp(sheet.points[line, 1])
+    assert covered == pytest.approx(whole, rel=1e-6)
+
+
+@pytest.mark.parametrize("fit", ["yes", 1, None])
+def test_another_value_of_fit_is_refused(fit):
+    with pytest.raises(anisomesh.OptionError, match="fit"):
+        anisomesh.RemeshOptions(fit=fit)
