@@ -244,3 +244,18 @@ def test_a_fit_gives_the_same_bits_again():
     first, second = (fit_without_faults(mesh, target, crease_edges=NO_EDGES) for _ in range(2))
     np.testing.assert_array_equal(first.points, second.points)
     np.testing.assert_array_equal(first.faces, second.faces)
+
+
+def test_more_collapses_than_are_looked_at_first_leave_consistent_arrays(monkeypatch):
+    """Sides of faces that earlier collapses have removed are still on the list."""
+    monkeypatch.setattr("anisomesh.fitting.state._CHEAP_FACTOR", 1)
+    surface = shapes.ellipsoid(subdivisions=3)
+    target = target_of(surface, count=5_000)
+    state = FitState(target.task(surface, NO_EDGES), target.samples, n_spare=1)
+    count = surface.n_points // 2
+    assert state.collapse(state.mean_triangle_error, count) == count
+    assert_consistent(state)
+    mesh = state.surface()
+    assert mesh.n_points == surface.n_points - count
+    assert (mesh.edge_face_count == 2).all()
+    assert euler_characteristic(mesh.faces) == 2

@@ -296,9 +296,12 @@ def collapse_estimates(fit, price, quadrics, estimates):
 
 @kernel
 def collapse_costs(fit, sides, price, max_square, costs):
-    """Write what a collapse of some sides, 3 face + side (n,), changes the energy by (n,)."""
+    """Write what a collapse of some sides, 3 face + side (n,), changes the energy by (n,); faces may be gone."""
     for k in range(len(sides)):
-        costs[k] = _collapse(fit, sides[k] // 3, sides[k] % 3, price, max_square, REFUSED)[0]
+        f, i = sides[k] // 3, sides[k] % 3
+        costs[k] = REFUSED
+        if fit.mesh.faces[f, 0] >= 0 and fit.mesh.neighbours[f, i] >= 0:
+            costs[k] = _collapse(fit, f, i, price, max_square, REFUSED)[0]
 
 
 @kernel
