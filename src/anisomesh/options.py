@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 import os
-from dataclasses import dataclass
+from dataclasses import dataclass, fields, replace
 from typing import TYPE_CHECKING, Any, Literal, get_args
 
 from anisomesh._values import real_number, whole_number
@@ -21,6 +21,8 @@ if TYPE_CHECKING:  # the command line imports this module, and has to start at o
 EmbeddingName = Literal["auto", "direct", "neural", "hybrid"]
 DeviceName = Literal["cpu", "cuda"]
 MAX_THREADS = 1024
+MIN_VERTICES = 4  # a tetrahedron
+_LARGEST_RATIO = 1e12  # vertices per vertex of the input; more is a mistake
 _NUMBERS = ("sharpness", "feature_angle", "weld_tolerance")
 _OPTIONAL_NUMBERS = ("final_sharpness", "time_limit")
 _LEAST = {"seed": 0, "threads": 1, "lloyd_iterations": 0, "max_iterations": 0, "embedding_iterations": 1}
@@ -45,8 +47,9 @@ class RemeshOptions:
         units; or a :class:`~anisomesh.metric.field.MetricSource`, such as ``Curvature()`` or ``Neural("file")``.
     embedding
         ``"direct"``: the metric is measured; ``"neural"``: short for ``metric=Neural(weights, device, denoise)``;
-        ``"hybrid"``: the same for ``Hybrid``, a mean of both; ``"auto"``: hybrid where torch is installed and the
-        metric is ``"curvature"``, the only one that networks predict, else direct. Or an
+        ``"hybrid"``: the same for ``Hybrid``, a mean of both; ``"auto"``: hybrid where torch is installed, the
+        metric is ``"curvature"``, the only one that networks predict, and fewer than a tenth of the edges of the input
+        are flat, as on measured surfaces; else direct. Or an
         :class:`~anisomesh.embedding.embedder.Embedder`, such as ``Direct(iterations=20)``.
     energy
         The energy that the sites minimise, an :class:`~anisomesh.cvt.energy.Energy`; by default
@@ -169,3 +172,31 @@ class RemeshOptions:
         network = self.embedding in ("neural", "hybrid") or self.weights is not None
         if network and not (isinstance(self.metric, str) and self.metric == "curvature"):
             raise OptionError("a network (embedding, weights) predicts the curvature metric and no other")
+
+
+def with_overrides(options: Any, overrides: dict[str, Any]) -> RemeshOptions:
+    """Return options with some fields replaced, or an error for another type or an unknown name."""
+    if not isinstance(options, RemeshOptions):
+        raise OptionError(f"options is of type {type(options).__name__}; expected RemeshOptions")
+    known = [field.name for field in fields(RemeshOptions)]
+    for name in overrides:
+        if name not in known:
+            raise OptionError(f"remesh has no option {name!r}; expected one of {', '.join(known)}")
+    return replace(options, **overrides)
+
+
+def read_target(n_vertices: object, ratio: object, max_error: object) -> tuple[int | None, float | None, float | None]:
+    """Return the one of the three that is given, as a number in range, and None for the others."""
+    if sum(value is not None for value in (n_vertices, ratio, max_error)) != 1:
+        raise OptionError("give one of n_vertices, ratio and max_error")
+    if n_vertices is not None:
+        return whole_number("n_vertices", n_vertices, MIN_VERTICES), None, None
+    if max_error is not None:
+        length = real_number("max_error", max_error)
+        if not (math.isfinite(length) and length > 0.0):
+            raise OptionError(f"max_error = {length}; expected a positive length in model units")
+        return None, None, length
+    share = real_number("ratio", ratio)
+    if not 0.0 < share <= _LARGEST_RATIO:
+        raise OptionError(f"ratio = {share}; expected a positive number, such as 0.2 for a fifth of the vertices")
+    return None, share, None

@@ -5,14 +5,13 @@ from __future__ import annotations
 import time
 from collections.abc import Iterator
 from contextlib import contextmanager
-from dataclasses import dataclass, fields, replace
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
 import numpy.typing as npt
 
 from anisomesh._arrays import EdgeMask, PointMask
-from anisomesh._values import real_number, whole_number
 from anisomesh.caveats import caveats, losses_of_repair
 from anisomesh.cvt.lbfgs import Optimised
 from anisomesh.cvt.schedule import DualFeedback, optimise_sites
@@ -37,14 +36,20 @@ from anisomesh.mesh.working_surface import working_surface
 from anisomesh.metric.field import MetricField, checked_field
 from anisomesh.metric.narrow_patches import limit_to_patches
 from anisomesh.metric.thin_walls import separate_thin_walls
-from anisomesh.options import RemeshOptions
+from anisomesh.options import MIN_VERTICES, RemeshOptions, read_target, with_overrides
 from anisomesh.progress import OnStep, StepInfo, ignore_steps
-from anisomesh.resolve import cvt_options, embedder, embedding_name, follows_creases, metric_source
+from anisomesh.resolve import (
+    cvt_options,
+    embedder,
+    embedding_name,
+    follows_creases,
+    metric_source,
+    with_embedding_chosen,
+)
 from anisomesh.result import RemeshResult
-from anisomesh.search import MIN_VERTICES, smallest_within
+from anisomesh.search import smallest_within
 from anisomesh.voronoi.restricted import RestrictedVoronoi
 
-_LARGEST_RATIO = 1e12  # vertices per vertex of the input; more is a mistake
 MAX_STARTS = 3  # of the optimisation, with one seed after the other, for a mesh without faults
 OPTIMISATION_SHARE = 0.6  # of the time limit, for everything up to the end of the optimisation
 
@@ -101,13 +106,13 @@ def remesh(
     ----------
     "NASM: Neural Anisotropic Surface Meshing", SIGGRAPH Asia 2024.
     """
-    options = _with_overrides(RemeshOptions() if options is None else options, overrides)
+    options = with_overrides(RemeshOptions() if options is None else options, overrides)
     deadline = Deadline(options.time_limit)
     if on_step is not None and not callable(on_step):
         raise OptionError(f"on_step = {on_step!r}; expected a function of a StepInfo")
     run = _Run(on_step or ignore_steps, deadline)
     surface = as_surface(mesh, faces)
-    n_vertices, ratio, max_error = _read_target(n_vertices, ratio, max_error)
+    n_vertices, ratio, max_error = read_target(n_vertices, ratio, max_error)
     with run.stage("prepare"):
         source = prepared_input(surface, options)
     prepared = source.prepared.surface
@@ -126,6 +131,7 @@ def remesh(
 def _remesh(source: PreparedInput, n: int, options: RemeshOptions, run: _Run) -> RemeshResult:
     """Remesh a prepared surface with n vertices."""
     prepared = source.prepared
+    options = with_embedding_chosen(options, prepared.surface)
     with run.stage("prepare"):
         frame = unit_frame(prepared.surface.points)
         surface = prepared.surface.with_points(frame.to_unit(prepared.surface.points))
@@ -286,30 +292,3 @@ class _Run:
 
     def total_seconds(self) -> dict[str, float]:
         return {**self._seconds, "total": self.deadline.seconds}
-
-
-def _with_overrides(options: RemeshOptions, overrides: dict[str, Any]) -> RemeshOptions:
-    if not isinstance(options, RemeshOptions):
-        raise OptionError(f"options is of type {type(options).__name__}; expected RemeshOptions")
-    known = [field.name for field in fields(RemeshOptions)]
-    for name in overrides:
-        if name not in known:
-            raise OptionError(f"remesh has no option {name!r}; expected one of {', '.join(known)}")
-    return replace(options, **overrides)
-
-
-def _read_target(n_vertices: object, ratio: object, max_error: object) -> tuple[int | None, float | None, float | None]:
-    """Return the one of the three that is given, as a number in range, and None for the others."""
-    if sum(value is not None for value in (n_vertices, ratio, max_error)) != 1:
-        raise OptionError("give one of n_vertices, ratio and max_error")
-    if n_vertices is not None:
-        return whole_number("n_vertices", n_vertices, MIN_VERTICES), None, None
-    if max_error is not None:
-        length = real_number("max_error", max_error)
-        if not (np.isfinite(length) and length > 0.0):
-            raise OptionError(f"max_error = {length}; expected a positive length in model units")
-        return None, None, length
-    share = real_number("ratio", ratio)
-    if not 0.0 < share <= _LARGEST_RATIO:
-        raise OptionError(f"ratio = {share}; expected a positive number, such as 0.2 for a fifth of the vertices")
-    return None, share, None

@@ -33,7 +33,10 @@ _BUILT_IN: dict[str, Callable[[float], MetricSource]] = {
 
 
 def embedding_name(options: RemeshOptions) -> str:
-    """Return ``"direct"``, ``"neural"`` or ``"hybrid"``, or the name of a metric source of the user."""
+    """Return ``"direct"``, ``"neural"`` or ``"hybrid"``, or the name of a metric source of the user.
+
+    ``"auto"`` is what it is for a measured surface.
+    """
     metric, embedding = options.metric, options.embedding
     if callable(metric):
         known = {Hybrid: "hybrid", Neural: "neural", Curvature: "direct", Approximation: "direct", Uniform: "direct"}
@@ -44,6 +47,25 @@ def embedding_name(options: RemeshOptions) -> str:
         return embedding
     network = options.weights is not None or torch_is_there()
     return "hybrid" if network and isinstance(metric, str) and metric == "curvature" else "direct"
+
+
+def with_embedding_chosen(options: RemeshOptions, surface: Surface) -> RemeshOptions:
+    """Return options with ``"auto"`` replaced by what it stands for, for a prepared input.
+
+    A designed surface has the metric measured: its curvature is exact, and a network does not see how thin its parts
+    are.
+    """
+    if options.embedding != "auto" or callable(options.metric):
+        return options
+    name = embedding_name(options)
+    if name == "hybrid" and options.weights is None and is_designed(surface):
+        name = "direct"
+    return replace(options, embedding=name)
+
+
+def is_designed(surface: Surface) -> bool:
+    """Return whether a surface is designed, as most machine parts, and not measured."""
+    return share_of_flat_edges(surface) >= DESIGNED_SHARE
 
 
 def metric_source(options: RemeshOptions, surface: Surface, tensors: PointTensors | None) -> MetricSource:
@@ -68,7 +90,7 @@ def metric_source(options: RemeshOptions, surface: Surface, tensors: PointTensor
         else:
             return _BUILT_IN[str(metric)](options.feature_angle)
     if isinstance(metric, Neural):
-        denoise = metric.denoise and options.denoise and share_of_flat_edges(surface) < DESIGNED_SHARE
+        denoise = metric.denoise and options.denoise and not is_designed(surface)
         return replace(metric, denoise=denoise)
     return metric
 

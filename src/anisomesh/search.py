@@ -10,9 +10,9 @@ from anisomesh.deadline import Deadline
 from anisomesh.errors import OptionError, TimeLimitError
 from anisomesh.mesh.distance import surface_distance
 from anisomesh.mesh.surface import Surface
+from anisomesh.options import MIN_VERTICES
 from anisomesh.result import RemeshResult
 
-MIN_VERTICES = 4  # a tetrahedron
 MAX_SEARCH_RUNS = 16  # heuristic; ten are usual
 COUNT_PRECISION = 1.03  # the search ends when a count smaller by this factor is known to be too small
 FIRST_RATIO = 0.1  # vertices per vertex of the surface, for the first run; heuristic

@@ -22,8 +22,8 @@ from anisomesh.evaluation.report import evaluate
 from anisomesh.io.atomic import append_line, drop_cut_line
 from anisomesh.isolation import isolated
 from anisomesh.mesh.surface import Surface
+from anisomesh.options import MIN_VERTICES
 from anisomesh.repair.prepare import prepare
-from anisomesh.search import MIN_VERTICES
 
 RunRow = dict[str, Any]
 ROW_KEY = ("mesh", "input", "ratio", "method", "seed")
