@@ -21,15 +21,14 @@ from .fit_patch import (
 from .triangulation import corner_of, faces_around, flip_side, has_edge, side_towards
 from .vectors import coordinates, dot, length, mapped, solve_symmetric, subtract, subtract_share
 
-_PULLS = (1e-12, 1e-6, 1e-3, 0.03, 0.3)  # weight of the pull towards good shapes, over the trace of the fit's matrix
-_N_SLIDING = 3  # first ones of these, with which a point stays on its crease
-_STAY_PULL, _HALF_PULL = 1e-3, 0.03  # the same towards the place of the point, and halfway to the good shapes
+_PULLS = (1e-12, 1e-3, 0.03, 0.3)  # weight of the pull towards good shapes, over the trace of the fit's matrix
+_N_SLIDING = 2  # first ones of these, with which a point stays on its crease
 _MIN_MOVE_COSINE = 0.5  # between normals before and after a move
 _MIN_FLIP_COSINE = 0.1  # between normals of triangles after a flip and the mean before
 _MAX_FOLD_COSINE = -0.2  # between the normals of the two triangles after a flip
 _MAX_STEP = 0.7  # mean edge lengths at the point
 _MIN_GAIN = 1e-6  # of the energy of the patch, so that of equally good places the first is taken
-_MIN_ACTIVE_GAIN = 1e-3  # of the energy of the patch, from which on a point and its neighbours are looked at again
+_MIN_ACTIVE_GAIN = 1e-2  # of the energy of the patch, from which on a point and its neighbours are looked at again
 _MIN_QUALITY = 0.05  # of a triangle after a move, unless there was a worse one
 
 
@@ -91,20 +90,9 @@ def _move(fit, point, price, max_square):
         return False
     target = subtract(_shape_target(fit, n, point), start)
     best, best_place = before, start
-    for candidate in range(len(_PULLS) + 2):
-        if candidate < len(_PULLS):
-            pull, share = _PULLS[candidate] * trace, 1.0
-        elif candidate == len(_PULLS):
-            pull, share = _STAY_PULL * trace, 0.0
-        else:
-            pull, share = _HALF_PULL * trace, 0.5
-        if fit.freedom[point] == 1 and candidate >= _N_SLIDING and candidate != len(_PULLS):
-            continue
-        pulled = (
-            right[0] + share * pull * target[0],
-            right[1] + share * pull * target[1],
-            right[2] + share * pull * target[2],
-        )
+    for candidate in range(_N_SLIDING if fit.freedom[point] == 1 else len(_PULLS)):
+        pull = _PULLS[candidate] * trace
+        pulled = subtract_share(right, -pull, target)
         step = solve_symmetric(matrix, pull, pulled)
         if not length(step) <= _MAX_STEP * reach:
             continue
