@@ -30,8 +30,8 @@ class FitOptions:
         Points added and removed in a round, of all points.
     """
 
-    price: float = 5.0
-    exchange_price: float = 1.0
+    price: float = 8.0
+    exchange_price: float = 2.0
     rounds: int = 4
     share: float = 0.05
 
