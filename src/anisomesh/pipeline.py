@@ -42,6 +42,7 @@ from anisomesh.resolve import (
     cvt_options,
     embedder,
     embedding_name,
+    fit_options,
     follows_creases,
     metric_source,
     with_embedding_chosen,
@@ -160,7 +161,7 @@ def _remesh(source: PreparedInput, n: int, options: RemeshOptions, run: _Run) ->
             n_vertices=n,
             deadline=run.deadline,
         )
-        target = _fit_target(task, working, field, options) if options.fit else None
+        target = _fit_target(task, working, field, options)
     run.check_time()
     made = _valid_mesh(task, target, options, run)
     mesh, optimised, validity = made.mesh, made.optimised, made.validity
@@ -192,14 +193,18 @@ def _remesh(source: PreparedInput, n: int, options: RemeshOptions, run: _Run) ->
     )
 
 
-def _fit_target(task: MeshingTask, working: Surface, field: MetricField, options: RemeshOptions) -> FitTarget:
-    """Return what meshes are fitted to; the field is on the working surface."""
+def _fit_target(task: MeshingTask, working: Surface, field: MetricField, options: RemeshOptions) -> FitTarget | None:
+    """Return what meshes are fitted to, None if they are not; the field is on the working surface."""
+    how = fit_options(options)
+    if how is None:
+        return None
     return FitTarget.of(
         task.reference,
         metric=(ClosestPoints(working), field),
         features=(task.voronoi.embedded.surface, task.features),
         n_vertices=task.n_vertices,
         crease_angle=options.feature_angle,
+        options=how,
     )
 
 

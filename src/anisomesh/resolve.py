@@ -10,6 +10,7 @@ from anisomesh.cvt.energy import Energy, NormalMetric
 from anisomesh.cvt.schedule import CVTOptions
 from anisomesh.embedding.embedder import Direct, Embedder
 from anisomesh.features.detect import share_of_flat_edges
+from anisomesh.fitting.fit import FitOptions
 from anisomesh.learn import torch_is_there
 from anisomesh.learn.inference.source import Hybrid, Neural
 from anisomesh.mesh.surface import Surface
@@ -24,6 +25,7 @@ Noise turns all edges, so measured surfaces have next to none; machine parts hav
 """
 
 _RESAMPLING_FACTOR = 1.5  # sharpness of the energy by which sites are sampled anew, over the sharpness; heuristic
+_NEAREST = FitOptions(price=3.0, exchange_price=0.2, rounds=5, share=0.1)  # chosen on training meshes
 _ITERATIONS = {True: 75, False: 150}  # of L-BFGS, with a fit at the end and without; from training meshes
 _BUILT_IN: dict[str, Callable[[float], MetricSource]] = {
     "curvature": lambda crease_angle: Curvature(crease_angle=crease_angle),
@@ -110,6 +112,17 @@ def energy(options: RemeshOptions) -> Energy:
 def follows_creases(options: RemeshOptions) -> bool:
     """Return whether detected creases are followed: always, except with the plain CVT."""
     return energy(options) != NormalMetric(1.0)
+
+
+def fit_options(options: RemeshOptions) -> FitOptions | None:
+    """Return how the mesh is fitted to the input at the end, None if it is not.
+
+    With the metric for the least distance the error counts more than by default.
+    """
+    if not options.fit:
+        return None
+    named = isinstance(options.metric, str) and options.metric == "approximation"
+    return _NEAREST if named or isinstance(options.metric, Approximation) else FitOptions()
 
 
 def cvt_options(options: RemeshOptions) -> CVTOptions:

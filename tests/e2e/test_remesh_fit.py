@@ -20,7 +20,7 @@ def test_a_fit_lowers_the_error_and_improves_triangles(name):
     shape = make()
     plain, fitted = (anisomesh.remesh(shape, n_vertices=n, embedding="direct", fit=fit) for fit in (False, True))
     before, after = (anisomesh.evaluate(shape, result.surface, samples=20_000) for result in (plain, fitted))
-    assert after.distance.rms < 0.8 * before.distance.rms
+    assert after.distance.rms < 0.85 * before.distance.rms
     assert after.shape.g_mean > before.shape.g_mean
     assert after.features.crease_covered >= before.features.crease_covered - 0.01
     assert after.features.corners_kept >= before.features.corners_kept

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 import numpy.typing as npt
@@ -43,6 +43,8 @@ class FitTarget:
         Degrees from which on an edge is a crease.
     holds_creases
         Whether points on creases stay, since they were prescribed and the shape may not tell where they are.
+    options
+        How meshes are fitted.
     """
 
     reference: ClosestPoints
@@ -50,6 +52,7 @@ class FitTarget:
     corners: Points
     crease_angle: float
     holds_creases: bool
+    options: FitOptions = field(default_factory=FitOptions)
 
     @classmethod
     def of(
@@ -59,6 +62,7 @@ class FitTarget:
         features: tuple[Surface, FeatureNetwork],
         n_vertices: int,
         crease_angle: float,
+        options: FitOptions | None = None,
     ) -> FitTarget:
         """Return the target for meshes of a number of vertices.
 
@@ -74,6 +78,8 @@ class FitTarget:
             Vertices of the meshes.
         crease_angle
             Degrees from which on an edge is a crease; 180 for none.
+        options
+            How meshes are fitted.
         """
         working, creases = features
         at_corner = corners(working, creases.sharp)
@@ -91,6 +97,7 @@ class FitTarget:
             corners=working.points[at_corner],
             crease_angle=crease_angle,
             holds_creases=bool(creases.required.any()),
+            options=FitOptions() if options is None else options,
         )
 
     def task(self, mesh: Surface, crease_edges: EdgeEnds) -> FitTask:
@@ -129,7 +136,8 @@ def fit_without_faults(
     """
     task = target.task(mesh, crease_edges)
     bound = len(faulty_faces(mesh, target.reference))
-    for options in (FitOptions(), FitOptions(), FitOptions(rounds=0), FitOptions(rounds=0)):
+    without_exchange = replace(target.options, rounds=0)
+    for options in (target.options, target.options, without_exchange, without_exchange):
         fitted = fit_mesh(task, target.samples, options, deadline=deadline)
         faulty = faulty_faces(fitted, target.reference)
         if len(faulty) <= bound:
