@@ -6,6 +6,7 @@ from pathlib import Path
 
 from anisomesh._kernels import (
     diagram,
+    fit_exchange,
     fit_moves,
     fit_samples,
     graph_hierarchy,
@@ -33,6 +34,12 @@ _REMESH = (
     fit_samples.average_roots,
     fit_samples.fit_error,
     fit_samples.quality_sum,
+    fit_samples.face_quadrics,
+    fit_exchange.split_gains,
+    fit_exchange.split_edges,
+    fit_exchange.collapse_estimates,
+    fit_exchange.collapse_costs,
+    fit_exchange.collapse_edges,
 )
 _NETWORK = (
     messages.mean_messages,

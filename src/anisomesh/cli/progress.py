@@ -129,4 +129,4 @@ def announce_compilation(display: Display, *works: str) -> None:
     from anisomesh._kernels.warmup import kernels_cached
 
     if not all(map(kernels_cached, works)):
-        display.note("compiling the numeric kernels (once per installation, up to a minute) ...")
+        display.note("compiling the numeric kernels (once per installation, one to two minutes) ...")

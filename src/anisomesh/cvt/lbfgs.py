@@ -25,7 +25,7 @@ class Status(StrEnum):
     """Why an optimisation stopped."""
 
     CONVERGED = "converged"
-    ITERATION_LIMIT = "all iterations done; more (max_iterations) would lower the energy a little"
+    ITERATION_LIMIT = "all iterations done"
     TIME_LIMIT = "ended by the time limit"
     NO_DESCENT = "no step lowers the energy further: a kink of the energy, or the limit of floating point"
 
