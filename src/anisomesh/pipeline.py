@@ -132,10 +132,10 @@ def remesh(
 def _remesh(source: PreparedInput, n: int, options: RemeshOptions, run: _Run) -> RemeshResult:
     """Remesh a prepared surface with n vertices."""
     prepared = source.prepared
-    options = with_embedding_chosen(options, prepared.surface)
     with run.stage("prepare"):
         frame = unit_frame(prepared.surface.points)
         surface = prepared.surface.with_points(frame.to_unit(prepared.surface.points))
+        options = with_embedding_chosen(options, surface)
         creases = sharp_edges(surface, min(options.feature_angle, WEAK_ANGLE))
         split = working_surface(surface, n, creases=creases, tagged=source.tagged)
         tips = apexes(split.coarse, sharp_edges(split.coarse, options.feature_angle))

@@ -26,7 +26,7 @@ Noise turns all edges, so measured surfaces have next to none; machine parts hav
 
 _RESAMPLING_FACTOR = 1.5  # sharpness of the energy by which sites are sampled anew, over the sharpness; heuristic
 _NEAREST = FitOptions(price=3.0, exchange_price=0.2, rounds=5, share=0.1)  # chosen on training meshes
-_ITERATIONS = {True: 75, False: 150}  # of L-BFGS, with a fit at the end and without; from training meshes
+_ITERATIONS, _ITERATIONS_BEFORE_FIT = 150, 75  # of L-BFGS at most; the second from training meshes
 _BUILT_IN: dict[str, Callable[[float], MetricSource]] = {
     "curvature": lambda crease_angle: Curvature(crease_angle=crease_angle),
     "approximation": lambda crease_angle: Approximation(crease_angle=crease_angle),
@@ -117,12 +117,14 @@ def follows_creases(options: RemeshOptions) -> bool:
 def fit_options(options: RemeshOptions) -> FitOptions | None:
     """Return how the mesh is fitted to the input at the end, None if it is not.
 
-    With the metric for the least distance the error counts more than by default.
+    With the metric for the least distance the error counts more than by default. A density says where points go, so
+    none are exchanged, and an own energy has the last word.
     """
-    if not options.fit:
+    if not options.fit or options.energy is not None:
         return None
     named = isinstance(options.metric, str) and options.metric == "approximation"
-    return _NEAREST if named or isinstance(options.metric, Approximation) else FitOptions()
+    chosen = _NEAREST if named or isinstance(options.metric, Approximation) else FitOptions()
+    return chosen if options.density is None else replace(chosen, rounds=0)
 
 
 def cvt_options(options: RemeshOptions) -> CVTOptions:
@@ -138,6 +140,13 @@ def cvt_options(options: RemeshOptions) -> CVTOptions:
         resampling_energy=resampling,
         relocate=follows_creases(options),
         lloyd_iterations=options.lloyd_iterations,
-        max_iterations=_ITERATIONS[options.fit] if options.max_iterations is None else options.max_iterations,
+        max_iterations=_max_iterations(options),
         seed=options.seed,
     )
+
+
+def _max_iterations(options: RemeshOptions) -> int:
+    """Return the bound on iterations of L-BFGS."""
+    if options.max_iterations is not None:
+        return options.max_iterations
+    return _ITERATIONS if fit_options(options) is None else _ITERATIONS_BEFORE_FIT

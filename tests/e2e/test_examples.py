@@ -114,5 +114,5 @@ def test_stages_make_a_valid_mesh_step_by_step(tmp_path, capsys):
     result = example("stages").main(str(tmp_path / "stages.png"), n_vertices=300)
     assert result.n_points == 300
     words = [line.split(":")[0] for line in capsys.readouterr().out.splitlines()]
-    assert words == ["prepared", "metric", "embedding", "features", "sites", "mesh"]
+    assert words == ["prepared", "metric", "embedding", "features", "sites", "dual", "fitted"]
     assert (tmp_path / "stages.png").stat().st_size > 10_000

@@ -28,18 +28,15 @@ _REMESH = (
     neighbours.displacements,
     neighbours.walk,
     local_step.local_step,
+)
+_FIT = (  # exchanges of edges compile more, where there are any
     fit_moves.move_points,
     fit_moves.flip_edges,
     fit_samples.walk_samples,
     fit_samples.average_roots,
     fit_samples.fit_error,
     fit_samples.quality_sum,
-    fit_samples.face_quadrics,
     fit_exchange.split_gains,
-    fit_exchange.split_edges,
-    fit_exchange.collapse_estimates,
-    fit_exchange.collapse_costs,
-    fit_exchange.collapse_edges,
 )
 _NETWORK = (
     messages.mean_messages,
@@ -59,7 +56,7 @@ _TRAIN = (
     messages.feature_distances_gradient,
 )
 _EVALUATE = (orientation.choose_axes, intersections.sort_into_tree, intersections.find_pairs)
-ENTRY_POINTS = {"remesh": _REMESH, "evaluate": _EVALUATE, "network": _NETWORK, "train": _TRAIN}
+ENTRY_POINTS = {"remesh": _REMESH, "fit": _FIT, "evaluate": _EVALUATE, "network": _NETWORK, "train": _TRAIN}
 """Kernels that each command calls."""
 
 

@@ -173,8 +173,11 @@ def run_remesh(
     from anisomesh.pipeline import remesh
     from anisomesh.resolve import embedding_name
 
-    source = RemeshOptions(**{name: options[name] for name in ("metric", "embedding", "weights") if name in options})
-    announce_compilation(display, "remesh", *(() if embedding_name(source) == "direct" else ("network",)))
+    source = RemeshOptions(
+        **{name: options[name] for name in ("metric", "embedding", "weights", "fit") if name in options}
+    )
+    works = ["remesh", *(["fit"] if source.fit else []), *(["network"] if embedding_name(source) != "direct" else [])]
+    announce_compilation(display, *works)
     result = remesh(surface, on_step=display, **options)
     report = result.report()
     seconds = report["seconds"]
