@@ -68,7 +68,7 @@ class RemeshOptions:
     fit
         Whether the mesh is fitted to the input at the end: vertices move and edges are flipped such that distance and
         shape of the triangles get better together. Without it the result is the dual of the tessellation, as in the
-        paper; so it is with an own ``energy``. With a ``density`` no points are exchanged.
+        paper; so it is with an ``energy`` other than ``NormalMetric``. With a ``density`` no points are exchanged.
     seed
         Seed of the start positions; the same seed and input give the same result. If the mesh has inverted or
         intersecting triangles that the input does not explain, the next two seeds are tried.

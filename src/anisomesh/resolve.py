@@ -120,7 +120,7 @@ def fit_options(options: RemeshOptions) -> FitOptions | None:
     With the metric for the least distance the error counts more than by default. A density says where points go, so
     none are exchanged, and an own energy has the last word.
     """
-    if not options.fit or options.energy is not None:
+    if not (options.fit and isinstance(energy(options), NormalMetric)):
         return None
     named = isinstance(options.metric, str) and options.metric == "approximation"
     chosen = _NEAREST if named or isinstance(options.metric, Approximation) else FitOptions()
