@@ -27,7 +27,7 @@ _MIN_MOVE_COSINE = 0.5  # between normals before and after a move
 _MIN_FLIP_COSINE = 0.1  # between normals of triangles after a flip and the mean before
 _MAX_FOLD_COSINE = -0.2  # between the normals of the two triangles after a flip
 _MAX_STEP = 0.7  # mean edge lengths at the point
-_MIN_GAIN = 1e-6  # of the energy of the patch, so that of equally good places the first is taken
+_MIN_GAIN = 1e-6  # of the energy of the patch, by which a later place has to be better than an earlier one
 _MIN_ACTIVE_GAIN = 1e-2  # of the energy of the patch, from which on a point and its neighbours are looked at again
 _MIN_QUALITY = 0.05  # of a triangle after a move, unless there was a worse one
 
