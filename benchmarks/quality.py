@@ -1,7 +1,10 @@
 """Quality, distance, creases and validity of remeshes of real meshes: smooth ones, CAD parts, badly triangulated ones.
 
-Usage: python benchmarks/quality.py [--folders test] [--ratios 1 0.2 0.1] [--sharpness 7 1] [--only NAME] [--kind KIND]
-       [--fresh]
+Usage: python benchmarks/quality.py [--folders test] [--ratios 1 0.2 0.1] [--sharpness 7 1] [--metric curvature]
+       [--only NAME] [--kind KIND] [--fresh] [--before FILE]
+
+Rows are kept in benchmarks/out/quality.jsonl, and a later call measures what is missing. To compare two versions, run
+one of them in another checkout, and give its file with --before.
 """
 
 from __future__ import annotations
@@ -12,6 +15,7 @@ import json
 import os
 import sys
 from collections import defaultdict
+from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -21,8 +25,10 @@ import numpy.typing as npt
 
 import anisomesh
 from anisomesh import MetricField, RemeshResult, Surface
+from anisomesh.bench.methods import METHODS
 from anisomesh.caveats import COUNT_TOLERANCE
 from anisomesh.mesh.closest_points import ClosestPoints
+from anisomesh.mesh.distance import surface_distance
 from anisomesh.metric.quality import anisotropic_quality
 from anisomesh.metric.transfer import transfer_to_corners
 
@@ -32,6 +38,9 @@ OUT = Path(__file__).parent / "out" / "quality.jsonl"
 BAD, CAD, SMOOTH = "bad triangles", "CAD", "smooth"
 MIN_QUALITY = 0.7  # area-weighted mean quality of the triangles, below which a mesh is badly triangulated
 FLAT_HEIGHT = 1e-6  # of the diagonal: corners this near to the plane of the closest input facet lie in it
+
+
+EXACT = 1e-9  # of the diagonal: added to distances before they are compared
 
 
 @dataclass(frozen=True)
@@ -44,6 +53,25 @@ class Case:
     @property
     def name(self) -> str:
         return f"{self.path.parent.name}/{self.path.stem}"
+
+
+@dataclass(frozen=True)
+class Run:
+    """A mesh and the options that it is remeshed with."""
+
+    case: Case
+    ratio: float
+    sharpness: float
+    metric: str
+
+    @property
+    def key(self) -> tuple[str, float, float, str]:
+        return self.case.name, self.ratio, self.sharpness, self.metric
+
+
+def key_of(row: dict[str, Any]) -> tuple[str, float, float, str]:
+    """Return the key of the run of a row."""
+    return row["mesh"], row["ratio"], row["sharpness"], row.get("metric", "curvature")
 
 
 def cases(data: Path, folders: list[str]) -> list[Case]:
@@ -88,19 +116,25 @@ def flat_quality(result: RemeshResult) -> float | None:
     return float(euclidean_quality(mesh)[flat].mean()) if flat.any() else None
 
 
-def measure(case: Case, ratio: float, sharpness: float) -> dict[str, Any]:
-    result = anisomesh.remesh(anisomesh.load(case.path), ratio=ratio, sharpness=sharpness, embedding="direct")
+def measure(run: Run) -> dict[str, Any]:
+    result = anisomesh.remesh(
+        anisomesh.load(run.case.path), ratio=run.ratio, sharpness=run.sharpness, metric=run.metric, embedding="direct"
+    )
     evaluation = anisomesh.evaluate(result.prepared, result.surface)
     distance = evaluation.distance
+    decimated = METHODS["vtk-quadric"].run(result.prepared, result.surface.n_points, 0, {}).surface
+    quadric = surface_distance(result.prepared, decimated)
     return {
-        "mesh": case.name,
-        "kind": case.kind,
-        "ratio": ratio,
-        "sharpness": sharpness,
+        "mesh": run.case.name,
+        "kind": run.case.kind,
+        "ratio": run.ratio,
+        "sharpness": run.sharpness,
+        "metric": run.metric,
         "g_mean": evaluation.shape.g_mean,
         "g_working": quality_in_own_metric(result),
         "flat_quality": flat_quality(result),
         "mean_square": distance.mean_square_ab + distance.mean_square_ba,
+        "over_quadric": (distance.rms * result.prepared.diagonal + EXACT) / (quadric.rms + EXACT),
         "hausdorff": distance.hausdorff,
         "creases": evaluation.features.crease_covered,
         **result.report(),
@@ -124,27 +158,24 @@ def faults(row: dict[str, Any]) -> list[str]:
 
 
 def tables(rows: list[dict[str, Any]]) -> str:
-    groups: dict[tuple[float, float, str], list[dict[str, Any]]] = defaultdict(list)
-    for row in rows:
-        groups[-row["sharpness"], -row["ratio"], row["kind"]].append(row)
     lines = [
-        "| s | ratio | meshes | G | G, working metric | G, least | flat triangles | creases | E2 [1e-7 D²] "
-        "| HD [1e-3 D] | time [s], mean | median | faults |",
-        "|" + "---|" * 13,
+        "| metric | s | ratio | meshes | G | G, working metric | G, least | flat triangles | creases | E2 [1e-7 D²] "
+        "| RMS over quadric decimation | largest | HD [1e-3 D] | time [s], mean | median | faults |",
+        "|" + "---|" * 16,
     ]
-    for (_, _, kind), group in sorted(groups.items()):
+    for group in grouped(rows):
         flat = [row["flat_quality"] for row in group if row["flat_quality"] is not None]
         seconds = [row["seconds"]["total"] for row in group]
         cells = [
-            f"{group[0]['sharpness']:g}",
-            f"{group[0]['ratio']:.0%}",
-            f"{len(group)} {kind}",
+            *headings(group),
             f"{mean(group, 'g_mean'):.3f}",
             f"{mean(group, 'g_working'):.3f}",
             f"{min(row['g_mean'] for row in group):.3f}",
             f"{np.mean(flat):.3f}" if flat else "",
             f"{mean(group, 'creases'):.1%}",
             f"{geometric_mean(group, 'mean_square') * 1e7:.2f}",
+            f"{geometric_mean(group, 'over_quadric'):.2f}",
+            f"{max(row['over_quadric'] for row in group):.2f}",
             f"{geometric_mean(group, 'hausdorff') * 1e3:.2f}",
             f"{np.mean(seconds):.2f}",
             f"{np.median(seconds):.2f}",
@@ -159,6 +190,63 @@ def tables(rows: list[dict[str, Any]]) -> str:
     return "\n".join(lines)
 
 
+def grouped(rows: list[dict[str, Any]]) -> list[list[dict[str, Any]]]:
+    """Return the rows of each metric, sharpness, ratio and kind of mesh."""
+    groups: dict[tuple[str, float, float, str], list[dict[str, Any]]] = defaultdict(list)
+    for row in rows:
+        groups[key_of(row)[3], -row["sharpness"], -row["ratio"], row["kind"]].append(row)
+    return [group for _, group in sorted(groups.items())]
+
+
+def headings(group: list[dict[str, Any]]) -> list[str]:
+    """Return metric, sharpness, ratio, and number and kind of the meshes of a group."""
+    first = group[0]
+    return [
+        key_of(first)[3],
+        f"{first['sharpness']:g}",
+        f"{first['ratio']:.0%}",
+        f"{len(group)} {first['kind']}",
+    ]
+
+
+def comparison(before: list[dict[str, Any]], after: list[dict[str, Any]]) -> str:
+    """Return a table of what two versions have on the same runs."""
+    earlier = {key_of(row): row for row in before}
+    lines = [
+        "| metric | s | ratio | meshes | G | flat triangles | creases | RMS | HD | time | faults |",
+        "|" + "---|" * 11,
+    ]
+    for group in grouped([row for row in after if key_of(row) in earlier]):
+        pairs = [(earlier[key_of(row)], row) for row in group]
+        flat = [pair for pair in pairs if None not in (pair[0]["flat_quality"], pair[1]["flat_quality"])]
+        cells = [
+            *headings(group),
+            _means(pairs, lambda row: row["g_mean"]),
+            _means(flat, lambda row: row["flat_quality"]),
+            _means(pairs, lambda row: row["creases"]),
+            _factor(pairs, lambda row: row["mean_square"] ** 0.5),
+            _factor(pairs, lambda row: row["hausdorff"]),
+            _factor(pairs, lambda row: row["seconds"]["total"]),
+            " -> ".join(str(sum(bool(faults(pair[k])) for pair in pairs)) for k in range(2)),
+        ]
+        lines.append(f"| {' | '.join(cells)} |")
+    return "\n".join(lines)
+
+
+Pairs = list[tuple[dict[str, Any], dict[str, Any]]]
+
+
+def _means(pairs: Pairs, figure: Callable[[dict[str, Any]], float]) -> str:
+    """Return the means of a figure before and after."""
+    return " -> ".join(f"{np.mean([figure(pair[k]) for pair in pairs]):.3f}" for k in range(2)) if pairs else ""
+
+
+def _factor(pairs: Pairs, figure: Callable[[dict[str, Any]], float]) -> str:
+    """Return the geometric mean of the factors that a figure has changed by."""
+    logs = [np.log((figure(after) + EXACT) / (figure(before) + EXACT)) for before, after in pairs]
+    return f"x {np.exp(np.mean(logs)):.2f}"
+
+
 def mean(rows: list[dict[str, Any]], name: str) -> float:
     return float(np.mean([row[name] for row in rows]))
 
@@ -168,57 +256,64 @@ def geometric_mean(rows: list[dict[str, Any]], name: str) -> float:
     return float(np.exp(np.mean(np.log([max(row[name], 1e-16) for row in rows]))))
 
 
-def read_rows() -> list[dict[str, Any]]:
+def read_rows(path: Path) -> list[dict[str, Any]]:
     """Return the rows of earlier calls; rows of versions with other names of the figures are left out."""
-    rows = [json.loads(line) for line in OUT.read_text().splitlines()] if OUT.exists() else []
-    return [row for row in rows if "kind" in row]
+    rows = [json.loads(line) for line in path.read_text().splitlines()] if path.exists() else []
+    return [row for row in rows if "over_quadric" in row]
 
 
 def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--ratios", type=float, nargs="+", default=[1.0, 0.2, 0.1])
     parser.add_argument("--sharpness", type=float, nargs="+", default=[7.0, 1.0])
+    parser.add_argument("--metric", nargs="+", default=["curvature"], choices=["curvature", "approximation"])
     parser.add_argument("--folders", nargs="+", default=["test"], help="subfolders of ANISOMESH_DATA")
     parser.add_argument("--only", default="", help="run only meshes with this in their names")
     parser.add_argument("--kind", choices=[BAD, CAD, SMOOTH], help="run only meshes of this kind")
     parser.add_argument("--fresh", action="store_true", help="discard earlier rows")
+    parser.add_argument("--before", type=Path, help="rows of another version to compare with")
     options = parser.parse_args()
     if "ANISOMESH_DATA" not in os.environ:
         sys.exit("set ANISOMESH_DATA to the folder of meshes")
     OUT.parent.mkdir(exist_ok=True)
     if options.fresh:
         OUT.unlink(missing_ok=True)
-    rows = read_rows()
-    done = {(row["mesh"], row["ratio"], row["sharpness"]) for row in rows}
+    rows = read_rows(OUT)
     chosen = [
         case
         for case in cases(Path(os.environ["ANISOMESH_DATA"]), options.folders)
         if options.only in case.name and options.kind in (None, case.kind)
     ]
-    todo = [
-        (case, ratio, sharpness)
+    runs = [
+        Run(case, ratio, sharpness, metric)
+        for metric in options.metric
         for ratio in options.ratios
         for sharpness in options.sharpness
         for case in chosen
-        if (case.name, ratio, sharpness) not in done
     ]
-    for number, (case, ratio, sharpness) in enumerate(todo, 1):
+    done = {key_of(row) for row in rows}
+    todo = [run for run in runs if run.key not in done]
+    for number, run in enumerate(todo, 1):
+        title = f"[{number}/{len(todo)}] {run.case.name[:34]:<34} {run.metric} {run.ratio:.0%} s={run.sharpness:g}"
         try:
-            row = measure(case, ratio, sharpness)
+            row = measure(run)
         except Exception as error:  # a crash is a result too
-            print(f"[{number}/{len(todo)}] {case.name} {ratio:.0%} s={sharpness:g}: {error!r}", file=sys.stderr)
+            print(f"{title}: {error!r}", file=sys.stderr)
             continue
         rows.append(row)
         with OUT.open("a") as file:
             file.write(json.dumps(row) + "\n")
         print(
-            f"[{number}/{len(todo)}] {case.name[:34]:<34} {ratio:.0%} s={sharpness:g} G {row['g_mean']:.3f} "
-            f"E2 {row['mean_square'] * 1e7:.2f}e-7 HD {row['hausdorff'] * 1e3:.2f}e-3 {row['seconds']['total']:.2f} s "
-            f"{' '.join(faults(row))}",
+            f"{title} G {row['g_mean']:.3f} E2 {row['mean_square'] * 1e7:.2f}e-7 x {row['over_quadric']:.2f} "
+            f"HD {row['hausdorff'] * 1e3:.2f}e-3 {row['seconds']['total']:.2f} s {' '.join(faults(row))}",
             file=sys.stderr,
             flush=True,
         )
-    print(tables([row for row in rows if row["mesh"] in {case.name for case in chosen}]))
+    asked = {run.key for run in runs}
+    rows = [row for row in rows if key_of(row) in asked]
+    print(tables(rows))
+    if options.before is not None:
+        print(comparison(read_rows(options.before), rows), sep="\n")
 
 
 if __name__ == "__main__":

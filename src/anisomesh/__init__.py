@@ -24,7 +24,8 @@ if TYPE_CHECKING:
     from anisomesh.errors import AnisomeshError, MeshError, MeshFileError, MetricError, OptionError
     from anisomesh.evaluation.report import Evaluation, evaluate
     from anisomesh.features.network import trace_features
-    from anisomesh.fitting.target import FitTarget, fit_without_faults
+    from anisomesh.fitting.target import FitTarget
+    from anisomesh.fitting.valid import fit_without_faults
     from anisomesh.io.meshes import load, save
     from anisomesh.learn.inference.source import Hybrid, Neural
     from anisomesh.mesh.embedded_surface import EmbeddedSurface
@@ -79,7 +80,7 @@ _MODULE_OF = {
     "MeshingTask": "delaunay.meshing",
     "mesh_from_sites": "delaunay.meshing",
     "FitTarget": "fitting.target",
-    "fit_without_faults": "fitting.target",
+    "fit_without_faults": "fitting.valid",
     # conformance tests of plug-ins
     "check_metric_source": "conformance",
     "check_embedder": "conformance",

@@ -23,7 +23,8 @@ from anisomesh.embedding.embedder import checked_embedding
 from anisomesh.errors import OptionError, TimeLimitError
 from anisomesh.features.detect import WEAK_ANGLE, apexes, sharp_edges
 from anisomesh.features.network import FeatureNetwork, trace_features
-from anisomesh.fitting.target import FitTarget, fit_without_faults
+from anisomesh.fitting.target import FitTarget
+from anisomesh.fitting.valid import fit_without_faults
 from anisomesh.inputs import PreparedInput, prepared_input
 from anisomesh.io.convert import as_surface
 from anisomesh.memory import check_memory
@@ -195,7 +196,7 @@ def _remesh(source: PreparedInput, n: int, options: RemeshOptions, run: _Run) ->
 
 def _fit_target(task: MeshingTask, working: Surface, field: MetricField, options: RemeshOptions) -> FitTarget | None:
     """Return what meshes are fitted to, None if they are not; the field is on the working surface."""
-    how = fit_options(options)
+    how = fit_options(options, task.surface)
     if how is None:
         return None
     return FitTarget.of(

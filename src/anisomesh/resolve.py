@@ -26,6 +26,7 @@ Noise turns all edges, so measured surfaces have next to none; machine parts hav
 
 _RESAMPLING_FACTOR = 1.5  # sharpness of the energy by which sites are sampled anew, over the sharpness; heuristic
 _NEAREST = FitOptions(price=3.0, exchange_price=0.2, rounds=5, share=0.1)  # chosen on training meshes
+_NEAREST_DECIMATION = FitOptions(price=10.0, exchange_price=2.0, rounds=3, min_quality=0.75)  # chosen on them too
 _ITERATIONS, _ITERATIONS_BEFORE_FIT = 150, 75  # of L-BFGS at most; the second from training meshes
 _BUILT_IN: dict[str, Callable[[float], MetricSource]] = {
     "curvature": lambda crease_angle: Curvature(crease_angle=crease_angle),
@@ -114,17 +115,24 @@ def follows_creases(options: RemeshOptions) -> bool:
     return energy(options) != NormalMetric(1.0)
 
 
-def fit_options(options: RemeshOptions) -> FitOptions | None:
-    """Return how the mesh is fitted to the input at the end, None if it is not.
+def fit_options(options: RemeshOptions, surface: Surface) -> FitOptions | None:
+    """Return how the mesh is fitted to the prepared input at the end, None if it is not.
 
-    With the metric for the least distance the error counts more than by default. A density says where points go, so
-    none are exchanged, and an own energy has the last word.
+    With the metric for the least distance the error counts more than by default, and on a designed surface a decimation
+    is fitted. A density says where points go, so none are exchanged, and an own energy has the last word.
     """
-    if not (options.fit and isinstance(energy(options), NormalMetric)):
+    if not is_fitted(options):
         return None
     named = isinstance(options.metric, str) and options.metric == "approximation"
     chosen = _NEAREST if named or isinstance(options.metric, Approximation) else FitOptions()
-    return chosen if options.density is None else replace(chosen, rounds=0)
+    if options.density is not None:
+        return replace(chosen, rounds=0)
+    return replace(chosen, decimation=_NEAREST_DECIMATION) if chosen is _NEAREST and is_designed(surface) else chosen
+
+
+def is_fitted(options: RemeshOptions) -> bool:
+    """Return whether the mesh is fitted to the input at the end."""
+    return options.fit and isinstance(energy(options), NormalMetric)
 
 
 def cvt_options(options: RemeshOptions) -> CVTOptions:
@@ -149,4 +157,4 @@ def _max_iterations(options: RemeshOptions) -> int:
     """Return the bound on iterations of L-BFGS."""
     if options.max_iterations is not None:
         return options.max_iterations
-    return _ITERATIONS if fit_options(options) is None else _ITERATIONS_BEFORE_FIT
+    return _ITERATIONS_BEFORE_FIT if is_fitted(options) else _ITERATIONS

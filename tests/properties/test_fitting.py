@@ -12,7 +12,8 @@ from anisomesh.features.detect import corners, sharp_edges
 from anisomesh.fitting.fit import FitOptions, fit_mesh
 from anisomesh.fitting.samples import sample_surface
 from anisomesh.fitting.state import FitState
-from anisomesh.fitting.target import FitTarget, fit_without_faults
+from anisomesh.fitting.target import FitTarget
+from anisomesh.fitting.valid import fit_without_faults
 from anisomesh.mesh.closest_points import ClosestPoints
 from anisomesh.mesh.distance import surface_distance
 from anisomesh.mesh.surface import Surface

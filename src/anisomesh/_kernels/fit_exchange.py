@@ -7,13 +7,13 @@ from .fit_patch import (
     gather_members,
     off_samples,
     patch_error,
-    quadric_value,
     relist,
     remember_normal,
     set_point,
     set_triangle,
     shape_loss,
 )
+from .quadrics import quadric_value
 from .triangulation import faces_around, join_across, side_towards, split_side
 from .vectors import coordinates, dot, length, solve_symmetric, subtract, subtract_share
 

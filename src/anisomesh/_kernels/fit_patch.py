@@ -353,17 +353,3 @@ def set_point(fit, point, place):
     """Move a point to a place."""
     points = fit.mesh.points
     points[point, 0], points[point, 1], points[point, 2] = place
-
-
-@inlined
-def quadric_value(quadric, place):
-    """Return the value of a quadric (10,) at a place: weighted squared distances to planes, see ``face_quadrics``."""
-    x, y, z = place
-    return (
-        quadric[0] * x * x
-        + quadric[1] * y * y
-        + quadric[2] * z * z
-        + 2.0 * (quadric[3] * x * y + quadric[4] * x * z + quadric[5] * y * z)
-        - 2.0 * (quadric[6] * x + quadric[7] * y + quadric[8] * z)
-        + quadric[9]
-    )

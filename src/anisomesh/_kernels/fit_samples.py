@@ -2,6 +2,7 @@
 
 from .compiled import inlined, kernel
 from .fit_patch import OPPOSED_COSINE, quality, unit_normal
+from .quadrics import add_plane
 from .vectors import coordinates, dot, square_to_triangle
 
 _MIN_SAME_COSINE = 0.5  # between normals of sample and face, from which on its metric counts there; heuristic
@@ -109,26 +110,11 @@ def quality_sum(fit):
 
 @kernel
 def face_quadrics(fit, quadrics):
-    """Write for each face the sum of w (n . (x - p))^2 over its samples p with normals n, as a quadric (F, 10) in x.
-
-    Coefficients of xx, yy, zz, xy, xz, yz, x, y, z and 1; the mixed and linear ones are halved.
-    """
+    """Write for each face the sum of w (n . (x - p))^2 over its samples p with normals n, as a quadric (F, 10) in x."""
     samples = fit.samples
     for face in range(len(quadrics)):
         for k in range(10):
             quadrics[face, k] = 0.0
     for sample in range(len(samples.points)):
-        weight, row = samples.weights[sample], quadrics[samples.owner[sample]]
-        normal = coordinates(samples.normals, sample)
-        x, y, z = normal
-        height = dot(normal, coordinates(samples.points, sample))
-        row[0] += weight * x * x
-        row[1] += weight * y * y
-        row[2] += weight * z * z
-        row[3] += weight * x * y
-        row[4] += weight * x * z
-        row[5] += weight * y * z
-        row[6] += weight * height * x
-        row[7] += weight * height * y
-        row[8] += weight * height * z
-        row[9] += weight * height * height
+        place, normal = coordinates(samples.points, sample), coordinates(samples.normals, sample)
+        add_plane(quadrics[samples.owner[sample]], samples.weights[sample], normal, place)

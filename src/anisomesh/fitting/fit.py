@@ -10,6 +10,7 @@ from anisomesh.fitting.state import FitState, FitTask
 from anisomesh.mesh.surface import Surface
 
 _FIRST_SWEEPS, _ROUND_SWEEPS, _LAST_SWEEPS = 4, 2, 8  # at most
+_RISE = (1.0, 3.0, 10.0, 30.0)  # steps of a price that rises
 _MIN_SWEEP_GAIN = 5e-3  # of the energy in a sweep, below which it is the last
 
 
@@ -28,12 +29,18 @@ class FitOptions:
         Rounds of exchanges; 0 to keep the points.
     share
         Points added and removed in a round, of all points.
+    min_quality
+        Mean quality up to which the price rises, to 30 times what it is; 0 for a price that stays.
+    decimation
+        How a decimation of the surface is fitted in place of a mesh; None to fit the mesh.
     """
 
     price: float = 8.0
     exchange_price: float = 2.0
     rounds: int = 4
     share: float = 0.05
+    min_quality: float = 0.0
+    decimation: FitOptions | None = None
 
 
 def fit_mesh(
@@ -55,8 +62,8 @@ def fit_mesh(
     Notes
     -----
     The energy is sum w d^2 + price sum (1 - G): weight and squared distance of each sample to the mesh, and the quality
-    of each triangle in the metric of its samples. The price is proportional to the error at the start, so it has no
-    unit, and what is exact stays so.
+    of each triangle in the metric of its samples. The price is proportional to the error at the start, so it does not
+    depend on the size of the surface, and what is exact stays so.
 
     - *Moves.* A point goes to the best of a few places: between the least squares fit of the planes of the samples
       around it, which is a system of three equations, and the mean of the places at which each of its triangles is
@@ -76,14 +83,23 @@ def fit_mesh(
     options = FitOptions() if options is None else options
     count = int(options.share * task.mesh.n_points) + 1 if options.rounds else 0
     state = FitState(task, samples, n_spare=count)
-    price, exchange_price = (factor * state.mean_triangle_error for factor in (options.price, options.exchange_price))
+    for factor in _RISE if options.min_quality > 0.0 else (1.0,):
+        _fit_at(state, options, factor * state.mean_triangle_error, count, deadline)
+        if deadline.passed() or (factor >= 1.0 and state.mean_quality >= options.min_quality):
+            break
+    return state.surface()
+
+
+def _fit_at(state: FitState, options: FitOptions, unit: float, count: int, deadline: Deadline) -> None:
+    """Lower the energy with prices in this unit, in every round with an exchange of this many points."""
+    price, exchange_price = options.price * unit, options.exchange_price * unit
+    state.wake()
     _settle(state, price, _FIRST_SWEEPS, deadline)
     for _ in range(options.rounds):
         if deadline.passed() or not _exchange(state, exchange_price, count, deadline):
             break
     state.wake()
     _settle(state, price, _LAST_SWEEPS, deadline)
-    return state.surface()
 
 
 def _settle(state: FitState, price: float, sweeps: int, deadline: Deadline) -> None:

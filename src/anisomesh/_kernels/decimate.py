@@ -1,0 +1,305 @@
+"""Quadric decimation: edges are collapsed, the cheapest first, until as many points are gone as wanted."""
+
+from typing import Any, NamedTuple
+
+from .compiled import kernel
+from .quadrics import add_plane, quadric_step, quadric_trace, quadric_value
+from .triangulation import corner_of, faces_around, join_across
+from .vectors import coordinates, cross, dot, length, squared_length, subtract, subtract_share
+
+_PULL = 1e-6  # towards the middle of an edge, where the planes leave the place open
+_MAX_STEP = 1.0  # edge lengths from the middle of an edge to the place of its point
+_LENGTH_WEIGHT = 1e-9  # of squared lengths beside squared distances: orders the collapses in planes; heuristic
+_BOUNDARY_WEIGHT = 3.0  # of a boundary edge, in squared lengths; heuristic
+_MIN_COSINE = 0.2  # between the normals of a triangle before and after a collapse; heuristic
+_MIN_THICKNESS = 0.01  # area over squared longest side of a new triangle, unless there was a thinner one; heuristic
+
+
+class Decimation(NamedTuple):
+    """A mesh that is decimated.
+
+    Attributes
+    ----------
+    mesh
+        The mesh. Faces that are gone have -1 as their first corner.
+    quadrics
+        A quadric for each point (V, 10), the last row for workspace (V + 1, 10).
+    held
+        1 for points that stay (V,).
+    at_boundary
+        1 for points of the boundary (V,).
+    face_at
+        One of the faces at each point (V,).
+    changed
+        The number of collapses after which each point was changed last (V,); -1 if it is gone.
+    costs, ends, made
+        Heap of edges, the cheapest first: cost, two ends (n, 2), and the number of collapses when it was entered (n,).
+    stars
+        Workspace (4, n) for the faces around two points, and their corners.
+    marks
+        0 for each point (V,) between uses.
+    """
+
+    mesh: Any
+    quadrics: Any
+    held: Any
+    at_boundary: Any
+    face_at: Any
+    changed: Any
+    costs: Any
+    ends: Any
+    made: Any
+    stars: Any
+    marks: Any
+
+
+@kernel
+def _swap(state, i, j):
+    """Exchange two entries of the heap."""
+    costs, ends, made = state.costs, state.ends, state.made
+    costs[i], costs[j] = costs[j], costs[i]
+    made[i], made[j] = made[j], made[i]
+    for end in range(2):
+        ends[i, end], ends[j, end] = ends[j, end], ends[i, end]
+
+
+@kernel
+def _push(state, size, p, q, now):
+    """Enter the edge p q into a heap of this size, if there is room, and return the size."""
+    if size == len(state.costs) or (state.held[p] and state.held[q]):
+        return size
+    state.costs[size] = _place(state, p, q)[0]
+    state.ends[size, 0], state.ends[size, 1], state.made[size] = p, q, now
+    k = size
+    while k > 0 and state.costs[k] < state.costs[(k - 1) // 2]:
+        _swap(state, k, (k - 1) // 2)
+        k = (k - 1) // 2
+    return size + 1
+
+
+@kernel
+def _pop(state, size):
+    """Move the cheapest entry of a heap of this size behind its new end, which is returned."""
+    last = size - 1
+    _swap(state, 0, last)
+    k = 0
+    while 2 * k + 1 < last:
+        child = 2 * k + 1
+        if child + 1 < last and state.costs[child + 1] < state.costs[child]:
+            child += 1
+        if not state.costs[child] < state.costs[k]:
+            break
+        _swap(state, k, child)
+        k = child
+    return last
+
+
+@kernel
+def _place(state, p, q):
+    """Return the cost of the collapse of the edge p q, and the place of its point."""
+    points, quadrics = state.mesh.points, state.quadrics
+    total = quadrics[len(quadrics) - 1]
+    for k in range(10):
+        total[k] = quadrics[p, k] + quadrics[q, k]
+    start, end = coordinates(points, p), coordinates(points, q)
+    along = subtract(end, start)
+    even = _LENGTH_WEIGHT * quadric_trace(total) * squared_length(along)
+    if state.held[p]:
+        return quadric_value(total, start) + even, start
+    if state.held[q]:
+        return quadric_value(total, end) + even, end
+    middle = subtract_share(start, -0.5, along)
+    step = quadric_step(total, middle, _PULL)
+    best_place, best = middle, quadric_value(total, middle)
+    if squared_length(step) <= _MAX_STEP * _MAX_STEP * squared_length(along):
+        best_place = subtract_share(middle, -1.0, step)
+        best = quadric_value(total, best_place)
+    for k in range(2):
+        place = start if k == 0 else end
+        value = quadric_value(total, place)
+        if value < best:
+            best, best_place = value, place
+    return max(best, 0.0) + even, best_place
+
+
+@kernel
+def _thickness(a, b, c):
+    """Return twice the normal of a triangle times its area, and its area over its squared longest side."""
+    u, v = subtract(b, a), subtract(c, a)
+    normal = cross(u, v)
+    longest = max(squared_length(u), squared_length(v), squared_length(subtract(v, u)))
+    if not longest > 0.0:
+        return normal, 0.0
+    return normal, 0.5 * length(normal) / longest
+
+
+@kernel
+def _mark_ring(state, faces, corners, n, value):
+    """Mark the points of the faces around a point, but not the point itself."""
+    for k in range(n):
+        for turn in range(1, 3):
+            state.marks[state.mesh.faces[faces[k], (corners[k] + turn) % 3]] = value
+
+
+@kernel
+def _keeps_topology(state, gone, n_gone, closed, n_into):
+    """Return whether the two points have no common neighbours but the ones across their edge (the link condition)."""
+    mesh, (faces, corners, other_faces, other_corners) = state.mesh, state.stars
+    _mark_ring(state, other_faces, other_corners, n_into, 1)
+    joined, common = 0, 0
+    for k in range(n_gone):
+        common += state.marks[mesh.faces[faces[k], (corners[k] + 1) % 3]]
+    if not closed:
+        common += state.marks[mesh.faces[faces[n_gone - 1], (corners[n_gone - 1] + 2) % 3]]
+    _mark_ring(state, other_faces, other_corners, n_into, 0)
+    for k in range(n_into):
+        for turn in range(1, 3):
+            joined += mesh.faces[other_faces[k], (other_corners[k] + turn) % 3] == gone
+    left = n_gone + n_into - 2 * joined
+    return common == joined and left >= (3 if closed and joined == 2 else 1)
+
+
+@kernel
+def _keeps_shapes(state, faces, corners, n, other, place):
+    """Return whether no triangle around a point, without the other one, turns or gets thin if it goes to a place."""
+    mesh = state.mesh
+    point = coordinates(mesh.points, mesh.faces[faces[0], corners[0]])
+    for k in range(n):
+        first, second = mesh.faces[faces[k], (corners[k] + 1) % 3], mesh.faces[faces[k], (corners[k] + 2) % 3]
+        if first == other or second == other:
+            continue
+        a, b = coordinates(mesh.points, first), coordinates(mesh.points, second)
+        old, thin = _thickness(point, a, b)
+        new, thickness = _thickness(place, a, b)
+        if not thickness >= min(thin, _MIN_THICKNESS):
+            return False
+        if not dot(old, new) >= _MIN_COSINE * length(old) * length(new) or not thickness > 0.0:
+            return False
+    return True
+
+
+@kernel
+def _collapse(state, p, q):
+    """Collapse the edge p q if that is allowed, and return the point that is left, or -1."""
+    mesh, (faces, corners, other_faces, other_corners) = state.mesh, state.stars
+    gone, into = (q, p) if state.held[p] or (state.at_boundary[p] and not state.at_boundary[q]) else (p, q)
+    if state.held[gone]:
+        return -1
+    face = state.face_at[gone]
+    n_gone, closed = faces_around(mesh, face, corner_of(mesh, face, gone), faces, corners)
+    face = state.face_at[into]
+    n_into, _ = faces_around(mesh, face, corner_of(mesh, face, into), other_faces, other_corners)
+    if n_gone < 0 or n_into < 0 or not _keeps_topology(state, gone, n_gone, closed, n_into):
+        return -1
+    if not closed and not _joined_by_boundary(state, gone, n_gone, into):
+        return -1
+    place = _place(state, p, q)[1]
+    if not _keeps_shapes(state, faces, corners, n_gone, into, place):
+        return -1
+    if not _keeps_shapes(state, other_faces, other_corners, n_into, gone, place):
+        return -1
+    for k in range(n_gone):
+        face = faces[k]
+        if mesh.faces[face, (corners[k] + 1) % 3] == into or mesh.faces[face, (corners[k] + 2) % 3] == into:
+            join_across(mesh, face, gone, into)
+    for k in range(n_gone):
+        if mesh.faces[faces[k], 0] >= 0:
+            mesh.faces[faces[k], corners[k]] = into
+            _note_face(state, faces[k])
+    for k in range(n_into):
+        if mesh.faces[other_faces[k], 0] >= 0:
+            _note_face(state, other_faces[k])
+    for k in range(10):
+        state.quadrics[into, k] += state.quadrics[gone, k]
+    mesh.points[into, 0], mesh.points[into, 1], mesh.points[into, 2] = place
+    state.changed[gone] = -1
+    return into
+
+
+@kernel
+def _joined_by_boundary(state, gone, n_gone, into):
+    """Return whether a point of the boundary is the next one on it: its faces begin or end there."""
+    mesh, (faces, corners, _, _) = state.mesh, state.stars
+    first = mesh.faces[faces[0], (corners[0] + 1) % 3]
+    last = mesh.faces[faces[n_gone - 1], (corners[n_gone - 1] + 2) % 3]
+    return first == into or last == into
+
+
+@kernel
+def _note_face(state, face):
+    """Note a face as one at its corners."""
+    for corner in range(3):
+        state.face_at[state.mesh.faces[face, corner]] = face
+
+
+@kernel
+def set_quadrics(state):
+    """Set the quadric of each point: planes of its faces, weighted by area, and walls on its boundary edges."""
+    mesh, quadrics = state.mesh, state.quadrics
+    for face in range(len(mesh.faces)):
+        for corner in range(3):
+            p = mesh.faces[face, corner]
+            q, r = mesh.faces[face, (corner + 1) % 3], mesh.faces[face, (corner + 2) % 3]
+            start, end = coordinates(mesh.points, q), coordinates(mesh.points, r)
+            apex = coordinates(mesh.points, p)
+            normal = cross(subtract(start, apex), subtract(end, apex))
+            size = length(normal)
+            if not size > 0.0:
+                continue
+            unit = normal[0] / size, normal[1] / size, normal[2] / size
+            add_plane(quadrics[p], 0.5 * size, unit, apex)
+            if mesh.neighbours[face, corner] < 0:
+                along = subtract(end, start)
+                across = cross(unit, along)
+                reach = length(across)
+                wall = across[0] / reach, across[1] / reach, across[2] / reach
+                weight = _BOUNDARY_WEIGHT * squared_length(along)
+                add_plane(quadrics[q], weight, wall, start)
+                add_plane(quadrics[r], weight, wall, start)
+
+
+@kernel
+def _push_all(state, now):
+    """Enter all edges into the empty heap, and return its size."""
+    mesh, size = state.mesh, 0
+    for face in range(len(mesh.faces)):
+        for side in range(3):
+            if mesh.faces[face, 0] >= 0 and face > mesh.neighbours[face, side]:
+                size = _push(state, size, mesh.faces[face, (side + 1) % 3], mesh.faces[face, (side + 2) % 3], now)
+    return size
+
+
+@kernel
+def _push_around(state, size, point, now):
+    """Enter the edges at a point into a heap of this size, and return the size."""
+    mesh, (faces, corners, _, _) = state.mesh, state.stars
+    face = state.face_at[point]
+    n, closed = faces_around(mesh, face, corner_of(mesh, face, point), faces, corners)
+    for k in range(n):
+        size = _push(state, size, point, mesh.faces[faces[k], (corners[k] + 1) % 3], now)
+    if n > 0 and not closed:
+        size = _push(state, size, point, mesh.faces[faces[n - 1], (corners[n - 1] + 2) % 3], now)
+    return size
+
+
+@kernel
+def decimate(state, wanted):
+    """Collapse the cheapest edges until as many points are gone as wanted, and return how many are.
+
+    An edge that was refused is looked at again when one of its ends has changed, or all others have been looked at.
+    """
+    count, progress = 0, True
+    while progress and count < wanted:
+        progress, size = False, _push_all(state, count)
+        while size > 0 and count < wanted:
+            size = _pop(state, size)
+            p, q, made = state.ends[size, 0], state.ends[size, 1], state.made[size]
+            if min(state.changed[p], state.changed[q]) < 0 or made < max(state.changed[p], state.changed[q]):
+                continue
+            point = _collapse(state, p, q)
+            if point < 0:
+                continue
+            progress, count = True, count + 1
+            state.changed[point] = count
+            size = _push_around(state, size, point, count)
+    return count

@@ -1,0 +1,98 @@
+"""Fits that add no faults."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+from scipy.spatial import cKDTree
+
+from anisomesh._arrays import FaceLabels, PointMask
+from anisomesh.deadline import NO_DEADLINE, Deadline
+from anisomesh.fitting.decimation import decimated
+from anisomesh.fitting.fit import FitOptions, fit_mesh
+from anisomesh.fitting.state import FitTask
+from anisomesh.fitting.target import EdgeEnds, FitTarget
+from anisomesh.mesh.surface import Surface
+from anisomesh.mesh.validity import faulty_faces
+
+_MAX_HELD = 0.5  # share of the points of a decimation that are corners at most, to hold them
+_NO_EDGES: EdgeEnds = np.zeros((0, 2), dtype=np.int64)
+
+
+def fit_without_faults(
+    mesh: Surface, target: FitTarget, *, crease_edges: EdgeEnds, deadline: Deadline = NO_DEADLINE
+) -> Surface:
+    """Return a mesh fitted to a surface, with as many points and no more faults than it had before.
+
+    Parameters
+    ----------
+    mesh
+        A manifold mesh near the surface.
+    target
+        The surface.
+    crease_edges
+        Ends of edges of the mesh along creases (n, 2), which stay if creases are held.
+    deadline
+        When to end.
+
+    Notes
+    -----
+    Where triangles are faulty after the fit, the points of the mesh and the edges between them are held, and the mesh
+    is fitted again: once with exchange of points, then twice without. If faults are left, the mesh itself is returned.
+
+    If the options say so, a decimation of the surface is fitted in the same way, and the mesh only if faults are left
+    on that. On machine parts it ends nearer, because the triangles of least error are longer on developable parts than
+    an embedding reproduces.
+    """
+    max_faults = len(faulty_faces(mesh, target.reference))
+    start = _decimated(target, mesh.n_points)
+    fitted = None if start is None else _fitted(start, target, target.options.decimation, max_faults, deadline)
+    if fitted is None:
+        fitted = _fitted(target.task(mesh, crease_edges), target, target.options, max_faults, deadline)
+    return mesh if fitted is None else fitted
+
+
+def _decimated(target: FitTarget, n_points: int) -> FitTask | None:
+    """Return the task to fit the surface decimated to this many points, None if that is not wanted or not possible."""
+    surface = target.reference.surface
+    if target.options.decimation is None or target.holds_creases:
+        return None
+    held = target.at_corners(surface.points)
+    if np.count_nonzero(held) > _MAX_HELD * n_points:
+        held[:] = False
+    start = decimated(surface, n_points, held)
+    return None if start is None else target.task(start, _NO_EDGES)
+
+
+def _fitted(
+    task: FitTask, target: FitTarget, options: FitOptions | None, max_faults: int, deadline: Deadline
+) -> Surface | None:
+    """Return the mesh of a task fitted with no more than this many faults, None if that does not succeed."""
+    mesh, options = task.mesh, options or FitOptions()
+    without_exchange = replace(options, rounds=0)
+    for how in (options, options, without_exchange, without_exchange):
+        fitted = fit_mesh(task, target.samples, how, deadline=deadline)
+        faulty = faulty_faces(fitted, target.reference)
+        if len(faulty) <= max_faults:
+            return fitted
+        near = _points_near(mesh, fitted, faulty)
+        if task.held[near].all():
+            near = _with_neighbours(mesh, near)
+        task = replace(task, held=task.held | near, kept=task.kept | near[mesh.edges].all(axis=1))
+    return None
+
+
+def _points_near(mesh: Surface, fitted: Surface, faces: FaceLabels) -> PointMask:
+    """Return which points of a mesh (V,) are nearest to these faces (n,) of the fitted mesh, and their neighbours."""
+    places = fitted.points[np.unique(fitted.faces[faces])]
+    near = np.zeros(mesh.n_points, dtype=bool)
+    near[cKDTree(mesh.points).query(places)[1]] = True
+    return _with_neighbours(mesh, near)
+
+
+def _with_neighbours(mesh: Surface, chosen: PointMask) -> PointMask:
+    """Return the chosen points (V,) and all points of the faces at them."""
+    grown = np.array(chosen)
+    grown[mesh.faces[chosen[mesh.faces].any(axis=1)]] = True
+    return grown
