@@ -57,10 +57,9 @@ def main(out: str = "stages.png", n_vertices: int = 600) -> anisomesh.Surface:
     # 6. Fit: less distance and better triangles with the same number of vertices
     target = anisomesh.FitTarget.of(
         task.reference,
-        metric=(task.reference, field),
-        features=(embedded.surface, features),
-        n_vertices=n_vertices,
-        crease_angle=40.0,
+        anisomesh.PlacedMetric(task.reference, field),
+        n_vertices,
+        corners=features.corner_places(embedded.surface),
     )
     fitted = anisomesh.fit_without_faults(dual, target, crease_edges=mesh.crease_edges)
     validity = check_validity(fitted, surface)

@@ -32,6 +32,7 @@ if TYPE_CHECKING:
     from anisomesh.mesh.surface import Surface
     from anisomesh.metric.field import MetricField
     from anisomesh.metric.sources import Approximation, Curvature, Uniform
+    from anisomesh.metric.transfer import PlacedMetric
     from anisomesh.options import RemeshOptions
     from anisomesh.pipeline import remesh
     from anisomesh.progress import StepInfo
@@ -79,6 +80,7 @@ _MODULE_OF = {
     "optimise_sites": "cvt.schedule",
     "MeshingTask": "delaunay.meshing",
     "mesh_from_sites": "delaunay.meshing",
+    "PlacedMetric": "metric.transfer",
     "FitTarget": "fitting.target",
     "fit_without_faults": "fitting.valid",
     # conformance tests of plug-ins
@@ -115,6 +117,7 @@ __all__ = [
     "Neural",
     "NormalMetric",
     "OptionError",
+    "PlacedMetric",
     "RemeshOptions",
     "RemeshResult",
     "RestrictedVoronoi",

@@ -2,9 +2,6 @@
 
 from __future__ import annotations
 
-import time
-from collections.abc import Iterator
-from contextlib import contextmanager
 from dataclasses import dataclass, replace
 from typing import Any
 
@@ -20,9 +17,10 @@ from anisomesh.delaunay.creases import missing_on_creases
 from anisomesh.delaunay.dual import dual_squared_errors
 from anisomesh.delaunay.meshing import MeshingTask, ValidMesh, mesh_from_sites
 from anisomesh.embedding.embedder import checked_embedding
-from anisomesh.errors import OptionError, TimeLimitError
+from anisomesh.errors import OptionError
 from anisomesh.features.detect import WEAK_ANGLE, apexes, sharp_edges
 from anisomesh.features.network import FeatureNetwork, trace_features
+from anisomesh.fitting.fit import FitOptions
 from anisomesh.fitting.target import FitTarget
 from anisomesh.fitting.valid import fit_without_faults
 from anisomesh.inputs import PreparedInput, prepared_input
@@ -37,6 +35,7 @@ from anisomesh.mesh.working_surface import working_surface
 from anisomesh.metric.field import MetricField, checked_field
 from anisomesh.metric.narrow_patches import limit_to_patches
 from anisomesh.metric.thin_walls import separate_thin_walls
+from anisomesh.metric.transfer import PlacedMetric
 from anisomesh.options import MIN_VERTICES, RemeshOptions, read_target, with_overrides
 from anisomesh.progress import OnStep, StepInfo, ignore_steps
 from anisomesh.resolve import (
@@ -49,11 +48,11 @@ from anisomesh.resolve import (
     with_embedding_chosen,
 )
 from anisomesh.result import RemeshResult
+from anisomesh.run import OPTIMISATION_SHARE, Run
 from anisomesh.search import smallest_within
 from anisomesh.voronoi.restricted import RestrictedVoronoi
 
 MAX_STARTS = 3  # of the optimisation, with one seed after the other, for a mesh without faults
-OPTIMISATION_SHARE = 0.6  # of the time limit, for everything up to the end of the optimisation
 
 
 def remesh(
@@ -112,7 +111,7 @@ def remesh(
     deadline = Deadline(options.time_limit)
     if on_step is not None and not callable(on_step):
         raise OptionError(f"on_step = {on_step!r}; expected a function of a StepInfo")
-    run = _Run(on_step or ignore_steps, deadline)
+    run = Run(on_step or ignore_steps, deadline)
     surface = as_surface(mesh, faces)
     n_vertices, ratio, max_error = read_target(n_vertices, ratio, max_error)
     with run.stage("prepare"):
@@ -123,15 +122,15 @@ def remesh(
 
         def with_vertices(n: int) -> RemeshResult:
             run.on_step(StepInfo(stage="search", message=f"{n:,} vertices"))
-            return _remesh(source, n, options, run)
+            return _remesh(source, n, options, run, nearest=True)
 
         return smallest_within(with_vertices, prepared, max_error, deadline)
     n = n_vertices or max(MIN_VERTICES, round((ratio or 0.0) * prepared.n_points))
     return _remesh(source, n, options, run)
 
 
-def _remesh(source: PreparedInput, n: int, options: RemeshOptions, run: _Run) -> RemeshResult:
-    """Remesh a prepared surface with n vertices."""
+def _remesh(source: PreparedInput, n: int, options: RemeshOptions, run: Run, *, nearest: bool = False) -> RemeshResult:
+    """Remesh a prepared surface with n vertices; ``nearest`` if the distance counts more than the shape."""
     prepared = source.prepared
     with run.stage("prepare"):
         frame = unit_frame(prepared.surface.points)
@@ -162,7 +161,7 @@ def _remesh(source: PreparedInput, n: int, options: RemeshOptions, run: _Run) ->
             n_vertices=n,
             deadline=run.deadline,
         )
-        target = _fit_target(task, working, field, options)
+        target = _fit_target(task, working, field, fit_options(options, surface, nearest=nearest))
     run.check_time()
     made = _valid_mesh(task, target, options, run)
     mesh, optimised, validity = made.mesh, made.optimised, made.validity
@@ -194,18 +193,20 @@ def _remesh(source: PreparedInput, n: int, options: RemeshOptions, run: _Run) ->
     )
 
 
-def _fit_target(task: MeshingTask, working: Surface, field: MetricField, options: RemeshOptions) -> FitTarget | None:
+def _fit_target(
+    task: MeshingTask, working: Surface, field: MetricField, options: FitOptions | None
+) -> FitTarget | None:
     """Return what meshes are fitted to, None if they are not; the field is on the working surface."""
-    how = fit_options(options, task.surface)
-    if how is None:
+    if options is None:
         return None
+    features = task.features
     return FitTarget.of(
         task.reference,
-        metric=(ClosestPoints(working), field),
-        features=(task.voronoi.embedded.surface, task.features),
-        n_vertices=task.n_vertices,
-        crease_angle=options.feature_angle,
-        options=how,
+        PlacedMetric(ClosestPoints(working), field),
+        task.n_vertices,
+        corners=features.corner_places(task.voronoi.embedded.surface),
+        holds_creases=bool(features.required.any()),
+        options=options,
     )
 
 
@@ -224,7 +225,7 @@ class _Made:
         return self.validity.inverted + self.validity.new_intersections + self.validity.flat
 
 
-def _valid_mesh(task: MeshingTask, target: FitTarget | None, options: RemeshOptions, run: _Run) -> _Made:
+def _valid_mesh(task: MeshingTask, target: FitTarget | None, options: RemeshOptions, run: Run) -> _Made:
     """Return the mesh of a task; from the next seeds while it has faults that the input does not explain."""
     best = made = _mesh_of_start(task, target, options, run)
     for seed in range(options.seed + 1, options.seed + MAX_STARTS):
@@ -238,7 +239,7 @@ def _valid_mesh(task: MeshingTask, target: FitTarget | None, options: RemeshOpti
     return best
 
 
-def _mesh_of_start(task: MeshingTask, target: FitTarget | None, options: RemeshOptions, run: _Run) -> _Made:
+def _mesh_of_start(task: MeshingTask, target: FitTarget | None, options: RemeshOptions, run: Run) -> _Made:
     """Return the mesh of a task from the sites that start from the seed of the options, fitted to the target."""
     with run.stage("cvt"):
         optimised = optimise_sites(
@@ -272,29 +273,3 @@ def _features(
     sharp = sharp_edges(embedded.surface, angle) | tagged
     apex = np.flatnonzero(tips & follows_creases(options))
     return trace_features(embedded, n, sharp=sharp, required=tagged, apexes=apex)
-
-
-class _Run:
-    """Stage times, time limit and progress of one run."""
-
-    def __init__(self, on_step: OnStep, deadline: Deadline) -> None:
-        self.on_step = on_step
-        self.deadline = deadline
-        self._seconds = {"load": 0.0}
-
-    @contextmanager
-    def stage(self, name: str) -> Iterator[None]:
-        self.on_step(StepInfo(stage=name))
-        start = time.perf_counter()
-        yield
-        self._seconds[name] = self._seconds.get(name, 0.0) + time.perf_counter() - start
-
-    def check_time(self) -> None:
-        if self.deadline.share(OPTIMISATION_SHARE).passed():
-            raise TimeLimitError(
-                f"the time limit of {self.deadline.limit:g} s was as good as over before the optimisation began (after "
-                f"{self.deadline.seconds:.1f} s); give more time, or ask for fewer vertices"
-            )
-
-    def total_seconds(self) -> dict[str, float]:
-        return {**self._seconds, "total": self.deadline.seconds}

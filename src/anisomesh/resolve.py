@@ -115,19 +115,23 @@ def follows_creases(options: RemeshOptions) -> bool:
     return energy(options) != NormalMetric(1.0)
 
 
-def fit_options(options: RemeshOptions, surface: Surface) -> FitOptions | None:
+def fit_options(options: RemeshOptions, surface: Surface, *, nearest: bool = False) -> FitOptions | None:
     """Return how the mesh is fitted to the prepared input at the end, None if it is not.
 
-    With the metric for the least distance the error counts more than by default, and on a designed surface a decimation
-    is fitted. A density says where points go, so none are exchanged, and an own energy has the last word.
+    With the metric for the least distance, or if the distance is what is asked for, the error counts more than by
+    default, and on a designed surface a decimation is fitted. A density says where points go, so none are exchanged,
+    and an own energy has the last word.
     """
     if not is_fitted(options):
         return None
     named = isinstance(options.metric, str) and options.metric == "approximation"
-    chosen = _NEAREST if named or isinstance(options.metric, Approximation) else FitOptions()
+    nearest |= named or isinstance(options.metric, Approximation)
+    chosen = replace(_NEAREST if nearest else FitOptions(), crease_angle=options.feature_angle)
     if options.density is not None:
         return replace(chosen, rounds=0)
-    return replace(chosen, decimation=_NEAREST_DECIMATION) if chosen is _NEAREST and is_designed(surface) else chosen
+    if not (nearest and is_designed(surface)):
+        return chosen
+    return replace(chosen, decimation=_NEAREST_DECIMATION)
 
 
 def is_fitted(options: RemeshOptions) -> bool:

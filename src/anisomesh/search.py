@@ -66,7 +66,11 @@ def smallest_within(
         raise OptionError(
             f"max_error = {max_error:g} is not reached: with {n:,} vertices the distance is {error:g}; allow more"
         )
-    return results[n]
+    result = results[n]
+    if n > surface.n_points:
+        more = f"the distance takes more vertices than the input has ({n:,} for {surface.n_points:,})"
+        result = replace(result, warnings=(*result.warnings, more))
+    return result
 
 
 def smallest_count(

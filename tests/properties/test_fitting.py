@@ -21,6 +21,7 @@ from anisomesh.mesh.topology import euler_characteristic, is_oriented
 from anisomesh.mesh.validity import faulty_faces
 from anisomesh.metric.field import MetricField
 from anisomesh.metric.quality import anisotropic_quality
+from anisomesh.metric.transfer import PlacedMetric
 from anisomesh.shapes import analytic as shapes
 from anisomesh.shapes.cad_part import cad_part
 
@@ -35,15 +36,14 @@ def target_of(surface, tensor=None, crease_angle=40.0, count=20_000):
         surface,
         count,
         creases=sharp,
-        metric=(reference, MetricField(tensors=tensors)),
+        metric=PlacedMetric(reference, MetricField(tensors=tensors)),
         rng=np.random.default_rng(1),
     )
     return FitTarget(
         reference=reference,
         samples=samples,
         corners=surface.points[corners(surface, sharp)],
-        crease_angle=crease_angle,
-        holds_creases=False,
+        options=FitOptions(crease_angle=crease_angle),
     )
 
 

@@ -5,6 +5,7 @@ from __future__ import annotations
 from pathlib import Path
 
 from anisomesh._kernels import (
+    decimate,
     diagram,
     fit_exchange,
     fit_moves,
@@ -38,6 +39,7 @@ _FIT = (  # exchanges of edges compile more, where there are any
     fit_samples.quality_sum,
     fit_exchange.split_gains,
 )
+_DECIMATE = (decimate.set_quadrics, decimate.decimate)
 _NETWORK = (
     messages.mean_messages,
     graph_hierarchy.maximal_independent_set,
@@ -56,7 +58,14 @@ _TRAIN = (
     messages.feature_distances_gradient,
 )
 _EVALUATE = (orientation.choose_axes, intersections.sort_into_tree, intersections.find_pairs)
-ENTRY_POINTS = {"remesh": _REMESH, "fit": _FIT, "evaluate": _EVALUATE, "network": _NETWORK, "train": _TRAIN}
+ENTRY_POINTS = {
+    "remesh": _REMESH,
+    "fit": _FIT,
+    "decimate": _DECIMATE,
+    "evaluate": _EVALUATE,
+    "network": _NETWORK,
+    "train": _TRAIN,
+}
 """Kernels that each command calls."""
 
 

@@ -176,7 +176,13 @@ def run_remesh(
     source = RemeshOptions(
         **{name: options[name] for name in ("metric", "embedding", "weights", "fit") if name in options}
     )
-    works = ["remesh", *(["fit"] if source.fit else []), *(["network"] if embedding_name(source) != "direct" else [])]
+    nearest = source.metric == "approximation" or options.get("max_error") is not None
+    works = [
+        "remesh",
+        *(["fit"] if source.fit else []),
+        *(["decimate"] if source.fit and nearest else []),
+        *(["network"] if embedding_name(source) != "direct" else []),
+    ]
     announce_compilation(display, *works)
     result = remesh(surface, on_step=display, **options)
     report = result.report()

@@ -6,12 +6,14 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from anisomesh._arrays import EdgeMask
+from anisomesh._arrays import EdgeMask, Points
 from anisomesh.errors import OptionError
 from anisomesh.features.boundary import BoundaryLoops, trace_boundary
 from anisomesh.features.creases import select_creases
+from anisomesh.features.detect import corners
 from anisomesh.features.polylines import FeaturePolylines, Floats, Ints
 from anisomesh.mesh.embedded_surface import EmbeddedSurface
+from anisomesh.mesh.surface import Surface
 
 _CORNER_SCALE = 0.75  # site spacings over which the turn of a boundary is measured; heuristic
 _MAX_CREASE_LENGTH = 1.6  # site spacings of crease for each site; longer ones leave no sites for the faces; heuristic
@@ -52,6 +54,12 @@ class FeatureNetwork:
     def any(self) -> bool:
         """Whether there is a boundary or a crease."""
         return self.boundary.n_polylines + self.creases.n_polylines > 0
+
+    def corner_places(self, surface: Surface) -> Points:
+        """Return where the surface has corners of creases and apexes (n, 3)."""
+        chosen = corners(surface, self.sharp)
+        chosen[self.apexes] = True
+        return np.asarray(surface.points[chosen])
 
 
 def trace_features(

@@ -33,6 +33,8 @@ class FitOptions:
         Mean quality up to which the price rises, to 30 times what it is; 0 for a price that stays.
     decimation
         How a decimation of the surface is fitted in place of a mesh; None to fit the mesh.
+    crease_angle
+        Degrees from which on an edge is a crease, along which points only slide; 180 for none.
     """
 
     price: float = 8.0
@@ -41,6 +43,7 @@ class FitOptions:
     share: float = 0.05
     min_quality: float = 0.0
     decimation: FitOptions | None = None
+    crease_angle: float = 40.0
 
 
 def fit_mesh(

@@ -8,10 +8,8 @@ import numpy as np
 import numpy.typing as npt
 
 from anisomesh._arrays import EdgeMask, Points, PointTensors
-from anisomesh.mesh.closest_points import ClosestPoints
 from anisomesh.mesh.surface import Surface
-from anisomesh.metric.field import MetricField
-from anisomesh.metric.transfer import roots_near
+from anisomesh.metric.transfer import PlacedMetric
 
 _METRIC_INSET = 1e-3  # of the way from a crease to the barycentre of a face, where the metric is the one of that face
 _CREASE_DENSITY = 3.0  # samples along creases on the length between samples of faces; heuristic
@@ -48,12 +46,7 @@ class SurfaceSamples:
 
 
 def sample_surface(
-    surface: Surface,
-    count: int,
-    *,
-    creases: EdgeMask,
-    metric: tuple[ClosestPoints, MetricField],
-    rng: np.random.Generator,
+    surface: Surface, count: int, *, creases: EdgeMask, metric: PlacedMetric, rng: np.random.Generator
 ) -> SurfaceSamples:
     """Return samples of faces, stratified by area, and of both sides of creases, stratified by length.
 
@@ -66,7 +59,7 @@ def sample_surface(
     creases
         Which edges (E,) are creases.
     metric
-        Closest points of a surface near this one, and a metric field on it.
+        The metric, on a surface near this one.
     rng
         Generator of the random places.
 
@@ -96,7 +89,7 @@ def sample_surface(
         points=np.ascontiguousarray(points),
         normals=surface.face_normals[face],
         weights=area,
-        roots=roots_near(*metric, inside),
+        roots=metric.roots(inside),
     )
 
 

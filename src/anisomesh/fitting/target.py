@@ -9,15 +9,14 @@ import numpy.typing as npt
 from scipy.spatial import cKDTree
 
 from anisomesh._arrays import PointMask, Points
-from anisomesh.features.detect import corners, sharp_edges
-from anisomesh.features.network import FeatureNetwork
+from anisomesh.features.detect import sharp_edges
 from anisomesh.fitting.fit import FitOptions
 from anisomesh.fitting.samples import SurfaceSamples, sample_surface
 from anisomesh.fitting.state import FitTask
 from anisomesh.mesh.closest_points import ClosestPoints
 from anisomesh.mesh.surface import Surface
 from anisomesh.mesh.topology import edge_keys
-from anisomesh.metric.field import MetricField
+from anisomesh.metric.transfer import PlacedMetric
 
 _SAME_PLACE = 1e-9  # at bounding-box diagonal 1
 _SAMPLES_PER_VERTEX, _MIN_SAMPLES = 40, 10_000  # fewer than 40 are fitted better than the surface between them
@@ -37,8 +36,6 @@ class FitTarget:
         Samples of it.
     corners
         Corners of its creases, and apexes (n, 3): points of a mesh that are at one stay there.
-    crease_angle
-        Degrees from which on an edge is a crease.
     holds_creases
         Whether points on creases stay, since they were prescribed and the shape may not tell where they are.
     options
@@ -48,18 +45,18 @@ class FitTarget:
     reference: ClosestPoints
     samples: SurfaceSamples
     corners: Points
-    crease_angle: float
-    holds_creases: bool
+    holds_creases: bool = False
     options: FitOptions = field(default_factory=FitOptions)
 
     @classmethod
     def of(
         cls,
         reference: ClosestPoints,
-        metric: tuple[ClosestPoints, MetricField],
-        features: tuple[Surface, FeatureNetwork],
+        metric: PlacedMetric,
         n_vertices: int,
-        crease_angle: float,
+        *,
+        corners: Points,
+        holds_creases: bool = False,
         options: FitOptions | None = None,
     ) -> FitTarget:
         """Return the target for meshes of a number of vertices.
@@ -69,34 +66,21 @@ class FitTarget:
         reference
             Closest points of the surface, at bounding-box diagonal 1.
         metric
-            Closest points of the working surface, which may differ by a tolerance, and the metric on it.
-        features
-            A surface with the points of the working surface, and its creases.
+            The metric, which may be on a surface that differs by a tolerance.
         n_vertices
             Vertices of the meshes.
-        crease_angle
-            Degrees from which on an edge is a crease; 180 for none.
-        options
-            How meshes are fitted.
+        corners, holds_creases, options
+            See the attributes.
         """
-        working, creases = features
-        at_corner = corners(working, creases.sharp)
-        at_corner[creases.apexes] = True
+        options = FitOptions() if options is None else options
         samples = sample_surface(
             reference.surface,
             max(_SAMPLES_PER_VERTEX * n_vertices, _MIN_SAMPLES),
-            creases=sharp_edges(reference.surface, crease_angle),
+            creases=sharp_edges(reference.surface, options.crease_angle),
             metric=metric,
             rng=np.random.default_rng(0),
         )
-        return cls(
-            reference=reference,
-            samples=samples,
-            corners=working.points[at_corner],
-            crease_angle=crease_angle,
-            holds_creases=bool(creases.required.any()),
-            options=FitOptions() if options is None else options,
-        )
+        return cls(reference=reference, samples=samples, corners=corners, holds_creases=holds_creases, options=options)
 
     def at_corners(self, points: Points) -> PointMask:
         """Return which points (n,) are at a corner."""
@@ -112,4 +96,4 @@ class FitTarget:
         kept = np.zeros(len(mesh.edges), dtype=bool)
         if self.holds_creases:
             kept = np.isin(edge_keys(mesh.edges), edge_keys(crease_edges))
-        return FitTask(mesh=mesh, held=held, kept=kept, crease_angle=self.crease_angle)
+        return FitTask(mesh=mesh, held=held, kept=kept, crease_angle=self.options.crease_angle)

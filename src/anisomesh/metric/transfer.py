@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass
+
 import numpy as np
 
 from anisomesh._arrays import CornerTensors, Points, PointTensors
@@ -14,6 +16,18 @@ from anisomesh.metric.tensors import metric_root
 _INSET = (
     0.1  # of the way from a corner to the barycentre: on its side of a crease also if the triangle is off by a little
 )
+
+
+@dataclass(frozen=True, eq=False)
+class PlacedMetric:
+    """A metric field, and the closest points of the surface on which it is given."""
+
+    surface: ClosestPoints
+    field: MetricField
+
+    def roots(self, places: Points) -> PointTensors:
+        """Return symmetric square roots of the metric (n, 3, 3) at the closest points to places (n, 3)."""
+        return roots_near(self.surface, self.field, places)
 
 
 def transfer_metric_roots(reference: ClosestPoints, roots: PointTensors, query_points: Points) -> PointTensors:
