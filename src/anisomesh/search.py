@@ -8,7 +8,7 @@ from math import exp, log
 
 from anisomesh.deadline import Deadline
 from anisomesh.errors import OptionError, TimeLimitError
-from anisomesh.mesh.distance import surface_distance
+from anisomesh.mesh.distance import hausdorff_distance
 from anisomesh.mesh.surface import Surface
 from anisomesh.options import MIN_VERTICES
 from anisomesh.result import RemeshResult
@@ -17,7 +17,7 @@ MAX_SEARCH_RUNS = 16  # heuristic; ten are usual
 COUNT_PRECISION = 1.03  # the search ends when a count smaller by this factor is known to be too small
 FIRST_RATIO = 0.1  # vertices per vertex of the surface, for the first run; heuristic
 MAX_RATIO, MAX_MORE = 4, 1_000  # largest count: ratio times the vertices of the surface, and more
-DISTANCE_SAMPLES = 50_000  # points on each surface besides vertices and edge midpoints
+DISTANCE_SAMPLES = 50_000  # points on each surface besides vertices and edge midpoints; the largest are followed
 
 
 def smallest_within(
@@ -47,7 +47,7 @@ def smallest_within(
 
     def error_at(n: int) -> float:
         result = remesh(n)
-        error = surface_distance(surface, result.surface, DISTANCE_SAMPLES).hausdorff
+        error = hausdorff_distance(surface, result.surface, DISTANCE_SAMPLES)
         if error <= max_error:
             results.clear()
             results[n] = replace(result, distance=error)  # only the last sufficient result is kept

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from anisomesh.errors import OptionError
-from anisomesh.mesh.distance import squared_distances, surface_distance
+from anisomesh.mesh.distance import hausdorff_distance, squared_distances, surface_distance
 from anisomesh.mesh.sampling import points_on_faces
 from anisomesh.mesh.surface import Surface
 from anisomesh.shapes.analytic import ellipsoid, open_patch, sphere, torus
@@ -124,3 +124,26 @@ def test_values_can_be_written_as_json():
 def test_no_sample_is_refused():
     with pytest.raises(OptionError, match="samples"):
         surface_distance(sphere(0), sphere(0), samples=0)
+
+
+@pytest.mark.parametrize("seed", range(5))
+def test_the_hausdorff_distance_is_found_between_samples(seed):
+    """A bump off the middle of one large triangle, narrower than the distance of samples, is farthest at its tip."""
+    rng = np.random.default_rng(seed)
+    corners = np.array([[0.0, 0.0, 0.0], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0]])
+    tip = rng.dirichlet([4.0, 4.0, 4.0]) @ corners
+    base = tip + 0.12 * np.array([[1.0, 0.0, 0.0], [-0.5, 0.8, 0.0], [-0.5, -0.8, 0.0]])
+    flat = Surface(np.concatenate([corners, base]), [[0, 1, 2], [3, 4, 5]])
+    bump = Surface(
+        np.concatenate([corners, base, tip[None] + np.array([[0.0, 0.0, 0.1]])]),
+        [[0, 1, 2], [3, 4, 6], [4, 5, 6], [5, 3, 6]],
+    )
+    assert hausdorff_distance(flat, bump, samples=200) == pytest.approx(0.1)
+    # from the flat triangle to one without it: farthest inside, where no vertex is
+    fan = Surface(np.concatenate([corners, tip[None] - np.array([[0.0, 0.0, 0.3]])]), [[0, 1, 3], [1, 2, 3], [2, 0, 3]])
+    single = Surface(corners, [[0, 1, 2]])
+    steps = np.linspace(0.0, 1.0, 400)
+    grid = np.array([(u, v, 1.0 - u - v) for u in steps for v in steps if u + v <= 1.0]) @ corners
+    exact = max(np.sqrt(squared_distances(grid, fan).max()), np.sqrt(squared_distances(fan.points, single).max()))
+    found = hausdorff_distance(single, fan, samples=50)
+    assert found == pytest.approx(exact, rel=2e-3)

@@ -10,11 +10,15 @@ from typing import Any
 
 import numpy as np
 
-from anisomesh._arrays import Floats, Points
+from anisomesh._arrays import Floats, Indices, Points
 from anisomesh.errors import OptionError
 from anisomesh.mesh.closest_points import ClosestPoints
 from anisomesh.mesh.sampling import points_on_faces
 from anisomesh.mesh.surface import Surface
+
+_N_CLIMBS, _N_MOVES = 256, 12  # samples that are followed to a maximum, and moves tried in each step
+_CLIMB_STEPS = 0.2 * 0.5 ** np.arange(8)  # in barycentric coordinates
+_MIDPOINTS = 0.5 * (1.0 - np.eye(3))  # of the sides opposite the corners
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -91,6 +95,43 @@ def surface_distance(
     max_ab, mean_ab = _one_sided(a, b, samples, rng)
     max_ba, mean_ba = _one_sided(b, a, samples, rng)
     return SurfaceDistance(max_ab=max_ab, max_ba=max_ba, mean_square_ab=mean_ab, mean_square_ba=mean_ba)
+
+
+def hausdorff_distance(a: Surface, b: Surface, samples: int = 50_000, seed: int = 0) -> float:
+    """Return the symmetric Hausdorff distance between two surfaces, from below but nearly exact, in their units.
+
+    The largest of the distances at vertices, edge midpoints and ``samples`` points of each surface are followed to the
+    maxima near them by a random search within their faces. The parameters are the ones of :func:`surface_distance`.
+    """
+    rng = np.random.default_rng(seed)
+    return max(_farthest(a, b, samples, rng), _farthest(b, a, samples, rng))
+
+
+def _farthest(a: Surface, b: Surface, samples: int, rng: np.random.Generator) -> float:
+    """Return the largest distance from a to b."""
+    closest = ClosestPoints(b)
+    corner = np.unique(a.faces, return_index=True)[1]
+    side = np.unique(a.face_edges, return_index=True)[1]
+    face = np.concatenate([corner // 3, side // 3, np.sort(rng.integers(0, a.n_faces, samples))])
+    random = rng.dirichlet(np.ones(3), samples)
+    weights = np.concatenate([np.eye(3)[corner % 3], _MIDPOINTS[side % 3], random])
+
+    def squares(face: Indices, weights: Floats) -> Floats:
+        return closest.squared_distances(np.einsum("nc,ncx->nx", weights, a.points[a.faces[face]]))
+
+    found = squares(face, weights)
+    largest = np.argsort(found)[-_N_CLIMBS:]
+    face, weights, found = face[largest], weights[largest], found[largest]
+    rows = np.arange(len(face))
+    for step in _CLIMB_STEPS:
+        moved = weights[:, None] + step * rng.normal(size=(len(face), _N_MOVES, 3))
+        moved = np.maximum(moved, 0.0)
+        moved /= np.maximum(moved.sum(axis=2, keepdims=True), 1e-300)
+        tried = squares(np.repeat(face, _N_MOVES), moved.reshape(-1, 3)).reshape(-1, _N_MOVES)
+        best = tried.argmax(axis=1)
+        better = tried[rows, best] > found
+        weights[better], found[better] = moved[rows, best][better], tried[rows, best][better]
+    return float(np.sqrt(found.max()))
 
 
 def squared_distances(points: Points, surface: Surface) -> Floats:
