@@ -9,6 +9,7 @@ from hypothesis import strategies as st
 
 from anisomesh._kernels import vectors
 from anisomesh.features.detect import corners, sharp_edges
+from anisomesh.fitting.decimation import decimated
 from anisomesh.fitting.fit import FitOptions, fit_mesh
 from anisomesh.fitting.samples import sample_surface
 from anisomesh.fitting.state import FitState
@@ -260,3 +261,42 @@ def test_more_collapses_than_are_looked_at_first_leave_consistent_arrays(monkeyp
     assert mesh.n_points == surface.n_points - count
     assert (mesh.edge_face_count == 2).all()
     assert euler_characteristic(mesh.faces) == 2
+
+
+def test_a_fit_that_leaves_faults_gives_the_mesh_itself(monkeypatch):
+    surface = shapes.ellipsoid(subdivisions=3)
+    mesh, target = shaken(surface, 0.1), target_of(surface, count=5_000)
+    before = faulty_faces(mesh, target.reference)
+
+    def with_a_fault(one, reference):
+        return before if one is mesh else np.arange(len(before) + 1)
+
+    monkeypatch.setattr("anisomesh.fitting.valid.faulty_faces", with_a_fault)
+    assert fit_without_faults(mesh, target, crease_edges=NO_EDGES) is mesh
+
+
+def test_a_decimation_is_fitted_where_the_options_say_so_and_faults_leave_the_mesh(monkeypatch):
+    part = cad_part(8)
+    mesh = shaken(decimated(part, 200, corners(part, sharp_edges(part, 40.0))), 0.0)
+    target = target_of(part)
+    options = FitOptions(decimation=FitOptions(price=10.0, min_quality=0.75))
+    nearest = dataclasses.replace(target, options=options)
+    fitted = fit_without_faults(mesh, nearest, crease_edges=NO_EDGES)
+    alone = fit_without_faults(mesh, target, crease_edges=NO_EDGES)
+    assert fitted.n_points == alone.n_points == 200
+    assert not np.array_equal(fitted.points, alone.points)
+    monkeypatch.setattr("anisomesh.fitting.valid.decimated", lambda surface, n_points, held: None)
+    again = fit_without_faults(mesh, nearest, crease_edges=NO_EDGES)
+    np.testing.assert_array_equal(again.points, alone.points)
+
+
+def test_the_price_rises_until_the_triangles_are_good_enough():
+    surface = shapes.ellipsoid(subdivisions=4)
+    start = decimated(surface, 200, np.zeros(surface.n_points, dtype=bool))
+    target = target_of(surface)
+    task = target.task(start, NO_EDGES)
+    wanted = (0.0, 0.95)
+    fitted = [fit_mesh(task, target.samples, FitOptions(price=1.0, min_quality=quality)) for quality in wanted]
+    states = [FitState(target.task(mesh, NO_EDGES), target.samples, n_spare=0) for mesh in fitted]
+    assert states[0].mean_quality < states[1].mean_quality
+    assert states[0].error < states[1].error

@@ -1,10 +1,6 @@
-"""Samples of a surface on the faces of a mesh that is fitted to it, and the energy of a patch of such faces.
-
-The faces of a patch, or the ones that a change would put in their place, are rows of corners in ``Patch.triangles``.
-"""
+"""The energy of a patch of faces of a fitted mesh, and the samples on them; arrays as in :mod:`fit_arrays`."""
 
 from math import sqrt
-from typing import Any, NamedTuple
 
 from .compiled import inlined, kernel
 from .vectors import (
@@ -15,6 +11,7 @@ from .vectors import (
     dot,
     length,
     mapped,
+    solve_symmetric,
     square_to_triangle,
     squared_length,
     subtract,
@@ -25,99 +22,8 @@ _OPPOSED_FACTOR = 4.0  # of squared distances to triangles of another sheet; heu
 _SMOOTH_COSINE = 0.9  # between the normals of a patch, above which the nearest triangle is the one below; heuristic
 _MIN_SAMPLE_COSINE = 0.3  # between the normal of a triangle and the sum over its samples; heuristic
 _MAX_AREA_FACTOR = 2.0  # area of a triangle over the area that its samples stand for; heuristic
+_PULL = 1e-3  # of a new place towards the one before it, over the trace of the matrix of the fit
 _AREA_SLACK = 3.0  # samples that this leaves out: a triangle between samples; heuristic
-
-
-class Samples(NamedTuple):
-    """Points of a surface, each of them on the list of one face of the mesh.
-
-    Attributes
-    ----------
-    points, normals
-        Points and unit normals (S, 3).
-    weights
-        The area that each stands for (S,).
-    roots
-        Symmetric square roots of the metric (S, 3, 3).
-    first, following
-        The first sample on the list of each face (F,), and the sample after each (S,); -1 at the end.
-    owner
-        The face that each sample is on (S,).
-    """
-
-    points: Any
-    normals: Any
-    weights: Any
-    roots: Any
-    first: Any
-    following: Any
-    owner: Any
-
-
-class Patch(NamedTuple):
-    """Workspace for a patch of faces.
-
-    Attributes
-    ----------
-    faces, corners
-        Faces, and the corner of each that is the point which they surround (n,).
-    triangles
-        Corners of the triangles that are looked at (n, 3).
-    before, normals, sums
-        Normals of triangles before a change, of the ones that are looked at, and sums over their samples (n, 3).
-    members, owners, trial
-        Samples of the faces, and the triangle that each is nearest to, for the best change and for one on trial (m,).
-    other_faces, other_corners
-        Faces and corners of a second point (n,).
-    marks
-        0 for each point (V,) between uses.
-    """
-
-    faces: Any
-    corners: Any
-    triangles: Any
-    before: Any
-    normals: Any
-    sums: Any
-    members: Any
-    owners: Any
-    trial: Any
-    other_faces: Any
-    other_corners: Any
-    marks: Any
-
-
-class Fit(NamedTuple):
-    """A mesh and the samples that it is fitted to.
-
-    Attributes
-    ----------
-    mesh
-        The mesh; sides with a label are not changed.
-    samples
-        The samples.
-    roots
-        The metric of each face (F, 3, 3), as a square root.
-    face_at
-        One of the faces at each point (V,).
-    freedom
-        0 for points that stay, 1 for points on creases, 2 for others (V,).
-    active
-        1 for points around which something has changed (V,): others are where they are best.
-    patch
-        Workspace.
-    place
-        Workspace for a point (3,).
-    """
-
-    mesh: Any
-    samples: Any
-    roots: Any
-    face_at: Any
-    freedom: Any
-    active: Any
-    patch: Any
-    place: Any
 
 
 @inlined
@@ -353,3 +259,15 @@ def set_point(fit, point, place):
     """Move a point to a place."""
     points = fit.mesh.points
     points[point, 0], points[point, 1], points[point, 2] = place
+
+
+@kernel
+def fitted_place(fit, m, owners, point):
+    """Return the place of a point that fits it to the members, near its present one."""
+    place = coordinates(fit.mesh.points, point)
+    matrix, right = fit_system(fit, m, owners, point)
+    trace = matrix[0] + matrix[3] + matrix[5]
+    if not trace > 0.0:
+        return place
+    step = solve_symmetric(matrix, _PULL * trace, right)
+    return place[0] + step[0], place[1] + step[1], place[2] + step[2]

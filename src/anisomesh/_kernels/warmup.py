@@ -7,9 +7,9 @@ from pathlib import Path
 from anisomesh._kernels import (
     decimate,
     diagram,
-    fit_exchange,
     fit_moves,
     fit_samples,
+    fit_splits,
     graph_hierarchy,
     integrate,
     intersections,
@@ -37,7 +37,7 @@ _FIT = (  # exchanges of edges compile more, where there are any
     fit_samples.average_roots,
     fit_samples.fit_error,
     fit_samples.quality_sum,
-    fit_exchange.split_gains,
+    fit_splits.split_gains,
 )
 _DECIMATE = (decimate.set_quadrics, decimate.decimate)
 _NETWORK = (

@@ -8,7 +8,7 @@ import numpy as np
 import numpy.typing as npt
 
 from anisomesh._arrays import EdgeMask, FaceLabels, PointMask
-from anisomesh._kernels import fit_exchange, fit_moves, fit_patch, fit_samples
+from anisomesh._kernels import fit_arrays, fit_collapses, fit_moves, fit_samples, fit_splits
 from anisomesh.features.detect import sharp_edges
 from anisomesh.fitting.samples import SurfaceSamples
 from anisomesh.mesh.closest_points import ClosestPoints
@@ -20,7 +20,7 @@ _MIN_RMS = 1e-8  # of the diagonal of the surface: an error that counts as exact
 _MAX_DISTANCE = 5.0  # of a vertex from the surface, in root mean squared errors at the start; heuristic
 _CHEAP_FACTOR = 8  # times as many collapses as are needed are looked at closely; heuristic
 _LISTED_SLACK = 1.5  # factor of the listed cost of a collapse, up to which it is done when its turn comes; heuristic
-_ALLOWED = 0.5 * fit_exchange.REFUSED
+_ALLOWED = 0.5 * fit_splits.REFUSED
 
 STAYS, SLIDES, FREE = 0, 1, 2  # freedom of points
 
@@ -125,12 +125,12 @@ class FitState:
         points = np.flatnonzero(fit.face_at < 0)[:count].astype(np.int32)
         faces = np.flatnonzero(fit.mesh.faces[:, 0] < 0)[: 2 * count].astype(np.int32)
         gains = np.empty((len(fit.mesh.faces), 3))
-        fit_exchange.split_gains(fit, price, self._max_square, points[0], gains)
+        fit_splits.split_gains(fit, price, self._max_square, points[0], gains)
         largest = 2.0 * price * (1.0 - self.mean_quality)
         sides = _cheapest(gains, largest)
         settings = price, self._max_square, self._crease_cosine, largest
         touched = np.zeros(len(fit.freedom), dtype=np.uint8)
-        done = int(fit_exchange.split_edges(fit, sides, settings, points, faces, touched))
+        done = int(fit_splits.split_edges(fit, sides, settings, points, faces, touched))
         self._refresh()
         return done
 
@@ -142,19 +142,19 @@ class FitState:
         fit, done = self.fit, 0
         quadrics, estimates = np.empty((len(fit.mesh.faces), 10)), np.empty((len(fit.mesh.faces), 3))
         fit_samples.face_quadrics(fit, quadrics)
-        fit_exchange.collapse_estimates(fit, price, quadrics, estimates)
+        fit_collapses.collapse_estimates(fit, price, quadrics, estimates)
         candidates, n_looked = _cheapest(estimates, _ALLOWED), _CHEAP_FACTOR * count
         while done < count and len(candidates):
             sides, candidates = candidates[:n_looked], candidates[n_looked:]
             costs = np.empty(len(sides))
-            fit_exchange.collapse_costs(fit, sides, price, self._max_square, costs)
+            fit_collapses.collapse_costs(fit, sides, price, self._max_square, costs)
             order = np.argsort(costs, kind="stable")
             order = order[costs[order] < _ALLOWED]
             limits = np.where(costs > 0.0, _LISTED_SLACK * costs, costs / _LISTED_SLACK)[order]
             now = 1
             while now > 0 and done < count:
                 settings, touched = (price, self._max_square, count - done), np.zeros(len(fit.freedom), dtype=np.uint8)
-                now = int(fit_exchange.collapse_edges(fit, sides[order], limits, settings, touched))
+                now = int(fit_collapses.collapse_edges(fit, sides[order], limits, settings, touched))
                 done += now
         self._refresh()
         return done
@@ -195,7 +195,7 @@ def _cheapest(values: npt.NDArray[np.float64], limit: float) -> npt.NDArray[np.i
     return sides[np.argsort(values.ravel()[sides], kind="stable")].astype(np.int64)
 
 
-def _arrays(task: FitTask, samples: SurfaceSamples, n_spare: int) -> fit_patch.Fit:
+def _arrays(task: FitTask, samples: SurfaceSamples, n_spare: int) -> fit_arrays.Fit:
     """Return the arrays of a fit, every sample on the face nearest to it."""
     mesh = task.mesh
     n_points, n_faces = mesh.n_points + 2 * n_spare, mesh.n_faces + 2 * n_spare
@@ -210,9 +210,9 @@ def _arrays(task: FitTask, samples: SurfaceSamples, n_spare: int) -> fit_patch.F
     faces, corners, other_faces, other_corners = np.zeros((4, _FACE_ROOM), dtype=np.int32)
     before, normals, sums = np.zeros((3, _FACE_ROOM, 3))
     members, owners, trial = np.zeros((3, _SAMPLE_ROOM), dtype=np.int32)
-    return fit_patch.Fit(
+    return fit_arrays.Fit(
         mesh=triangulation,
-        samples=fit_patch.Samples(
+        samples=fit_arrays.Samples(
             points=samples.points,
             normals=samples.normals,
             weights=samples.weights,
@@ -225,7 +225,7 @@ def _arrays(task: FitTask, samples: SurfaceSamples, n_spare: int) -> fit_patch.F
         face_at=face_at,
         freedom=freedom,
         active=np.ones(n_points, dtype=np.uint8),
-        patch=fit_patch.Patch(
+        patch=fit_arrays.Patch(
             faces=faces,
             corners=corners,
             triangles=np.zeros((_FACE_ROOM, 3), dtype=np.int32),

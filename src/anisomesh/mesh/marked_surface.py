@@ -46,7 +46,7 @@ class MarkedSurface:
         surface = self.surface
         max_points = surface.n_points + max_faces - surface.n_faces
         mesh = Triangulation(
-            points=np.empty((max_points, 3)),
+            points=np.zeros((max_points, 3)),
             faces=np.empty((max_faces, 3), dtype=np.int32),
             neighbours=np.full((max_faces, 3), -1, dtype=np.int32),
             labels=np.zeros((max_faces, 3), dtype=self.labels.dtype),
