@@ -126,12 +126,16 @@ def fit_options(options: RemeshOptions, surface: Surface, *, nearest: bool = Fal
         return None
     named = isinstance(options.metric, str) and options.metric == "approximation"
     nearest |= named or isinstance(options.metric, Approximation)
-    chosen = replace(_NEAREST if nearest else FitOptions(), crease_angle=options.feature_angle)
+    chosen = _with_options(_NEAREST if nearest else FitOptions(), options)
     if options.density is not None:
         return replace(chosen, rounds=0)
     if not (nearest and is_designed(surface)):
         return chosen
-    return replace(chosen, decimation=_NEAREST_DECIMATION)
+    return replace(chosen, decimation=_with_options(_NEAREST_DECIMATION, options))
+
+
+def _with_options(fit: FitOptions, options: RemeshOptions) -> FitOptions:
+    return replace(fit, crease_angle=options.feature_angle, threads=options.threads)
 
 
 def is_fitted(options: RemeshOptions) -> bool:

@@ -7,7 +7,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from anisomesh._kernels import vectors
+from anisomesh._kernels import fit_moves, vectors
 from anisomesh.features.detect import corners, sharp_edges
 from anisomesh.fitting.decimation import decimated
 from anisomesh.fitting.fit import FitOptions, fit_mesh
@@ -300,3 +300,26 @@ def test_the_price_rises_until_the_triangles_are_good_enough():
     states = [FitState(target.task(mesh, NO_EDGES), target.samples, n_spare=0) for mesh in fitted]
     assert states[0].mean_quality < states[1].mean_quality
     assert states[0].error < states[1].error
+
+
+def test_a_fit_gives_the_same_bits_with_any_number_of_threads():
+    surface = shapes.ellipsoid(subdivisions=4)
+    mesh, target = shaken(surface, 0.1), target_of(surface, count=20_000)
+    results = [fit_mesh(target.task(mesh, NO_EDGES), target.samples, FitOptions(threads=n)) for n in (1, 2, 3)]
+    for result in results[1:]:
+        np.testing.assert_array_equal(result.points, results[0].points)
+        np.testing.assert_array_equal(result.faces, results[0].faces)
+
+
+def test_neighbours_have_different_colours():
+    surface = cad_part(8)
+    target = target_of(surface, count=5_000)
+    state = FitState(target.task(surface, NO_EDGES), target.samples, n_spare=5)
+    state.fit.active[::3] = 0
+    colours = np.empty(len(state.fit.freedom), dtype=np.int32)
+    count = fit_moves.colour_points(state.fit, colours)
+    assert 3 < count < 20
+    moved = (state.fit.active == 1) & (state.fit.freedom > 0) & (state.fit.face_at >= 0)
+    np.testing.assert_array_equal(colours >= 0, moved)
+    first, second = colours[surface.edges].T
+    assert ((first != second) | (first < 0)).all()

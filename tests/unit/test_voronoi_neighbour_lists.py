@@ -5,8 +5,8 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from anisomesh.threads import Workers
 from anisomesh.voronoi.neighbour_lists import NeighbourLists
-from anisomesh.voronoi.threads import Workers
 from conftest import examples
 
 

@@ -29,6 +29,7 @@ _MAX_FOLD_COSINE = -0.2  # between the normals of the two triangles after a flip
 _MAX_STEP = 0.7  # mean edge lengths at the point
 _MIN_GAIN = 1e-6  # of the energy of the patch, by which a later place has to be better than an earlier one
 _MIN_ACTIVE_GAIN = 1e-2  # of the energy of the patch, from which on a point and its neighbours are looked at again
+_MAX_COLOURS = 60  # bits that tell the colours of neighbours; a point with more neighbours stays
 _MIN_QUALITY = 0.05  # of a triangle after a move, unless there was a worse one
 
 
@@ -120,23 +121,54 @@ def _move(fit, point, price, max_square):
 
 
 @kernel
-def move_points(fit, price, max_square):
-    """Move each active point to the place that lowers the energy most; return how many have moved.
+def colour_points(fit, colours):
+    """Give each point to be moved a colour (V,) that no neighbour has, -1 to others; return the number of colours.
+
+    Points of one colour have no face in common, so they can be moved in any order or at the same time.
+    """
+    mesh, patch, count = fit.mesh, fit.patch, 0
+    for point in range(len(colours)):
+        colours[point] = -1
+    for point in range(len(colours)):
+        face = fit.face_at[point]
+        if not fit.active[point] or fit.freedom[point] == 0 or face < 0:
+            continue
+        n, _ = faces_around(mesh, face, corner_of(mesh, face, point), patch.faces, patch.corners)
+        if n > _MAX_COLOURS:
+            continue
+        taken = 0
+        for k in range(n):
+            for turn in range(1, 3):
+                colour = colours[mesh.faces[patch.faces[k], (patch.corners[k] + turn) % 3]]
+                if colour >= 0:
+                    taken |= 1 << colour
+        colour = 0
+        while taken & (1 << colour):
+            colour += 1
+        colours[point] = colour
+        count = max(count, colour + 1)
+    return count
+
+
+@kernel
+def move_points(fit, points, price, max_square):
+    """Move each of some points (n,) to the place that lowers the energy most; return how many have moved.
 
     Parameters
     ----------
     fit
         Mesh and samples. Points that are not worth another look are inactive afterwards.
+    points
+        Points of one colour.
     price
         Energy of a triangle of quality 0.
     max_square
         Squared distance of a place from the surface, up to which it is allowed in any case.
     """
     count = 0
-    for point in range(len(fit.freedom)):
-        if fit.active[point] and fit.freedom[point] > 0 and fit.face_at[point] >= 0:
-            fit.active[point] = 0
-            count += _move(fit, point, price, max_square)
+    for k in range(len(points)):
+        fit.active[points[k]] = 0
+        count += _move(fit, points[k], price, max_square)
     return count
 
 

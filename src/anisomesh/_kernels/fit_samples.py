@@ -20,39 +20,61 @@ def face_points(mesh, face):
 
 
 @kernel
-def walk_samples(fit):
-    """Move every sample to the list of the nearest face, from face to face across sides, and list them anew.
+def _nearer_face(fit, sample):
+    """Return the face nearest to a sample that a walk finds, from face to face across sides.
 
     A face across a side is nearer only if it faces the way of the sample.
     """
     mesh, samples = fit.mesh, fit.samples
+    p, upright = coordinates(samples.points, sample), coordinates(samples.normals, sample)
+    face, best = samples.owner[sample], float("inf")
+    came_from, searching = -1, True
+    while searching:
+        a, b, c = face_points(mesh, face)
+        best = min(best, square_to_triangle(p, a, b, c))
+        searching = False
+        nearest = face
+        for side in range(3):
+            other = mesh.neighbours[face, side]
+            if other < 0 or other == came_from:
+                continue
+            a, b, c = face_points(mesh, other)
+            if dot(upright, unit_normal(a, b, c)[0]) < OPPOSED_COSINE:
+                continue
+            square = square_to_triangle(p, a, b, c)
+            if square < best:
+                best, nearest = square, other
+                searching = True
+        came_from, face = face, nearest
+    return face
+
+
+@kernel
+def walk_samples(fit, everywhere):
+    """Move samples to the lists of the nearest faces, and list them anew: the ones of faces with an active point."""
+    mesh, samples, active = fit.mesh, fit.samples, fit.active
     for face in range(len(samples.first)):
         samples.first[face] = -1
     for sample in range(len(samples.points)):
-        p, upright = coordinates(samples.points, sample), coordinates(samples.normals, sample)
-        face, best = samples.owner[sample], float("inf")
-        came_from = -1
-        searching = True
-        while searching:
-            a, b, c = face_points(mesh, face)
-            best = min(best, square_to_triangle(p, a, b, c))
-            searching = False
-            nearest = face
-            for side in range(3):
-                other = mesh.neighbours[face, side]
-                if other < 0 or other == came_from:
-                    continue
-                a, b, c = face_points(mesh, other)
-                if dot(upright, unit_normal(a, b, c)[0]) < OPPOSED_COSINE:
-                    continue
-                square = square_to_triangle(p, a, b, c)
-                if square < best:
-                    best, nearest = square, other
-                    searching = True
-            came_from, face = face, nearest
-        samples.owner[sample] = face
+        face = samples.owner[sample]
+        corners = mesh.faces[face]
+        if everywhere or active[corners[0]] or active[corners[1]] or active[corners[2]]:
+            face = _nearer_face(fit, sample)
+            samples.owner[sample] = face
         samples.following[sample] = samples.first[face]
         samples.first[face] = sample
+
+
+@kernel
+def face_errors(fit, errors):
+    """Write the sum of the weighted squared distances of the samples of each face (F,)."""
+    mesh, samples = fit.mesh, fit.samples
+    for face in range(len(errors)):
+        errors[face] = 0.0
+    for sample in range(len(samples.points)):
+        face = samples.owner[sample]
+        a, b, c = face_points(mesh, face)
+        errors[face] += samples.weights[sample] * square_to_triangle(coordinates(samples.points, sample), a, b, c)
 
 
 @kernel

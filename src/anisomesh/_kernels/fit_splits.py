@@ -70,16 +70,13 @@ def _split(fit, f, i, price, max_square, point):
 
 
 @kernel
-def split_gains(fit, price, max_square, point, gains):
-    """Write what a split of every side changes the energy by (F, 3): sides of lower faces, and nothing for others.
+def split_gains(fit, sides, price, max_square, point, gains):
+    """Write what a split of some sides, 3 face + side (n,), changes the energy by (n,).
 
     ``point`` is a free point, for workspace.
     """
-    for face in range(len(gains)):
-        for side in range(3):
-            gains[face, side] = REFUSED
-            if fit.mesh.faces[face, 0] >= 0 and face < fit.mesh.neighbours[face, side]:
-                gains[face, side] = _split(fit, face, side, price, max_square, point)[0]
+    for k in range(len(sides)):
+        gains[k] = _split(fit, sides[k] // 3, sides[k] % 3, price, max_square, point)[0]
 
 
 @kernel

@@ -35,6 +35,8 @@ class FitOptions:
         How a decimation of the surface is fitted in place of a mesh; None to fit the mesh.
     crease_angle
         Degrees from which on an edge is a crease, along which points only slide; 180 for none.
+    threads
+        Number of threads; the result does not depend on it.
     """
 
     price: float = 8.0
@@ -44,6 +46,7 @@ class FitOptions:
     min_quality: float = 0.0
     decimation: FitOptions | None = None
     crease_angle: float = 40.0
+    threads: int = 1
 
 
 def fit_mesh(
@@ -85,7 +88,7 @@ def fit_mesh(
     """
     options = FitOptions() if options is None else options
     count = int(options.share * task.mesh.n_points) + 1 if options.rounds else 0
-    state = FitState(task, samples, n_spare=count)
+    state = FitState(task, samples, n_spare=count, threads=options.threads)
     for factor in _RISE if options.min_quality > 0.0 else (1.0,):
         _fit_at(state, options, factor * state.mean_triangle_error, count, deadline)
         if deadline.passed() or (factor >= 1.0 and state.mean_quality >= options.min_quality):

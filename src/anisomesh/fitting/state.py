@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from itertools import pairwise
 
 import numpy as np
 import numpy.typing as npt
@@ -14,12 +15,14 @@ from anisomesh.fitting.samples import SurfaceSamples
 from anisomesh.mesh.closest_points import ClosestPoints
 from anisomesh.mesh.marked_surface import MarkedSurface
 from anisomesh.mesh.surface import Surface
+from anisomesh.threads import Workers
 
 _FACE_ROOM, _SAMPLE_ROOM = 1_024, 65_536  # around a point; points with more stay
 _MIN_RMS = 1e-8  # of the diagonal of the surface: an error that counts as exact
 _MAX_DISTANCE = 5.0  # of a vertex from the surface, in root mean squared errors at the start; heuristic
-_CHEAP_FACTOR = 8  # times as many collapses as are needed are looked at closely; heuristic
+_CHEAP_FACTOR = 8  # times as many splits and collapses as are needed are looked at closely; heuristic
 _LISTED_SLACK = 1.5  # factor of the listed cost of a collapse, up to which it is done when its turn comes; heuristic
+_PARTS, _MIN_PART = 4, 64  # parts of the points of a colour for each thread, and points of a part at least
 _ALLOWED = 0.5 * fit_splits.REFUSED
 
 STAYS, SLIDES, FREE = 0, 1, 2  # freedom of points
@@ -58,6 +61,8 @@ class FitState:
         Samples of the surface that it is fitted to.
     n_spare
         Points that it may have more while edges are exchanged.
+    threads
+        Number of threads that move points.
 
     Attributes
     ----------
@@ -67,11 +72,15 @@ class FitState:
         Mean squared distance of the samples at the start, at least the one that counts as exact.
     """
 
-    def __init__(self, task: FitTask, samples: SurfaceSamples, n_spare: int) -> None:
+    def __init__(self, task: FitTask, samples: SurfaceSamples, n_spare: int, threads: int = 1) -> None:
         self.fit = _arrays(task, samples, n_spare)
+        self._workers = Workers(threads)
+        others = (self.fit._replace(patch=_workspace(len(self.fit.freedom))) for _ in range(threads - 1))
+        self._views = [self.fit, *others]  # each with a workspace of its own
+        self._colours = np.empty(len(self.fit.freedom), dtype=np.int32)
         self._totals = np.zeros(len(self.fit.mesh.faces))
         self._crease_cosine = float(np.cos(np.radians(task.crease_angle)))
-        self._refresh()
+        self._refresh(everywhere=True)
         self._area = float(samples.weights.sum())
         self.mean_square = max(self.error / self._area, _MIN_RMS**2)
         self._max_square = _MAX_DISTANCE**2 * self.mean_square
@@ -104,8 +113,19 @@ class FitState:
         self._refresh()
 
     def move(self, price: float) -> int:
-        """Move all active points, and return how many have moved."""
-        return int(fit_moves.move_points(self.fit, price, self._max_square))
+        """Move all active points, and return how many have moved; the result is the same for any number of threads."""
+        n_colours = fit_moves.colour_points(self.fit, self._colours)
+        order = np.argsort(self._colours, kind="stable")
+        bounds = np.searchsorted(self._colours[order], np.arange(n_colours + 1))
+        count = 0
+
+        def work(thread: int, points: npt.NDArray[np.int64]) -> int:
+            return int(fit_moves.move_points(self._views[thread], points, price, self._max_square))
+
+        for start, end in pairwise(bounds.tolist()):
+            n_parts = max(1, min(_PARTS * len(self._views), (end - start) // _MIN_PART))
+            count += sum(self._workers.map(work, np.array_split(order[start:end], n_parts)))
+        return count
 
     def flip(self, price: float) -> int:
         """Flip edges once, and return how many were flipped."""
@@ -124,15 +144,26 @@ class FitState:
         fit = self.fit
         points = np.flatnonzero(fit.face_at < 0)[:count].astype(np.int32)
         faces = np.flatnonzero(fit.mesh.faces[:, 0] < 0)[: 2 * count].astype(np.int32)
-        gains = np.empty((len(fit.mesh.faces), 3))
-        fit_splits.split_gains(fit, price, self._max_square, points[0], gains)
+        sides = self._sides_of_largest_error(_CHEAP_FACTOR * count)
+        gains = np.empty(len(sides))
+        fit_splits.split_gains(fit, sides, price, self._max_square, points[0], gains)
         largest = 2.0 * price * (1.0 - self.mean_quality)
-        sides = _cheapest(gains, largest)
+        order = np.argsort(gains, kind="stable")
+        sides = sides[order[gains[order] < largest]]
         settings = price, self._max_square, self._crease_cosine, largest
         touched = np.zeros(len(fit.freedom), dtype=np.uint8)
         done = int(fit_splits.split_edges(fit, sides, settings, points, faces, touched))
         self._refresh()
         return done
+
+    def _sides_of_largest_error(self, count: int) -> npt.NDArray[np.int64]:
+        """Return sides between two faces, as 3 face + side (n,), the ones with the largest errors of both faces."""
+        mesh, errors = self.fit.mesh, np.empty(len(self.fit.mesh.faces))
+        fit_samples.face_errors(self.fit, errors)
+        own = np.arange(len(errors))[:, None]
+        one_of_two = (mesh.faces[:, :1] >= 0) & (own < mesh.neighbours)
+        both = np.where(one_of_two, -(errors[:, None] + errors[mesh.neighbours]), np.inf)
+        return _cheapest(both, np.inf)[:count]
 
     def collapse(self, price: float, count: int) -> int:
         """Collapse up to ``count`` edges, the ones that raise the energy least, and return how many.
@@ -183,9 +214,9 @@ class FitState:
     def _count_faces(self) -> int:
         return int(np.count_nonzero(self.fit.mesh.faces[:, 0] >= 0))
 
-    def _refresh(self) -> None:
-        """Move samples to the nearest faces, and take the metric of the faces from them."""
-        fit_samples.walk_samples(self.fit)
+    def _refresh(self, *, everywhere: bool = False) -> None:
+        """Move samples around active points to the nearest faces, and take the metric of all faces from samples."""
+        fit_samples.walk_samples(self.fit, everywhere)
         fit_samples.average_roots(self.fit, self._totals)
 
 
@@ -207,9 +238,6 @@ def _arrays(task: FitTask, samples: SurfaceSamples, n_spare: int) -> fit_arrays.
     freedom[: mesh.n_points][task.held | mesh.on_boundary] = STAYS
     face_at = np.full(n_points, -1, dtype=np.int32)
     face_at[mesh.faces] = np.arange(mesh.n_faces, dtype=np.int32)[:, None]
-    faces, corners, other_faces, other_corners = np.zeros((4, _FACE_ROOM), dtype=np.int32)
-    before, normals, sums = np.zeros((3, _FACE_ROOM, 3))
-    members, owners, trial = np.zeros((3, _SAMPLE_ROOM), dtype=np.int32)
     return fit_arrays.Fit(
         mesh=triangulation,
         samples=fit_arrays.Samples(
@@ -225,21 +253,29 @@ def _arrays(task: FitTask, samples: SurfaceSamples, n_spare: int) -> fit_arrays.
         face_at=face_at,
         freedom=freedom,
         active=np.ones(n_points, dtype=np.uint8),
-        patch=fit_arrays.Patch(
-            faces=faces,
-            corners=corners,
-            triangles=np.zeros((_FACE_ROOM, 3), dtype=np.int32),
-            before=before,
-            normals=normals,
-            sums=sums,
-            members=members,
-            owners=owners,
-            trial=trial,
-            other_faces=other_faces,
-            other_corners=other_corners,
-            marks=np.zeros(n_points, dtype=np.uint8),
-        ),
+        patch=_workspace(n_points),
         place=np.zeros(3),
+    )
+
+
+def _workspace(n_points: int) -> fit_arrays.Patch:
+    """Return workspace for one thread, for a mesh of this many points."""
+    faces, corners, other_faces, other_corners = np.zeros((4, _FACE_ROOM), dtype=np.int32)
+    before, normals, sums = np.zeros((3, _FACE_ROOM, 3))
+    members, owners, trial = np.zeros((3, _SAMPLE_ROOM), dtype=np.int32)
+    return fit_arrays.Patch(
+        faces=faces,
+        corners=corners,
+        triangles=np.zeros((_FACE_ROOM, 3), dtype=np.int32),
+        before=before,
+        normals=normals,
+        sums=sums,
+        members=members,
+        owners=owners,
+        trial=trial,
+        other_faces=other_faces,
+        other_corners=other_corners,
+        marks=np.zeros(n_points, dtype=np.uint8),
     )
 
 

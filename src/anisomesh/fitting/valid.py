@@ -13,10 +13,14 @@ from anisomesh.fitting.decimation import decimated
 from anisomesh.fitting.fit import FitOptions, fit_mesh
 from anisomesh.fitting.state import FitTask
 from anisomesh.fitting.target import EdgeEnds, FitTarget
+from anisomesh.mesh.closest_points import ClosestPoints
 from anisomesh.mesh.surface import Surface
 from anisomesh.mesh.validity import faulty_faces
+from anisomesh.meshops.inverted import remove_inverted_triangles
+from anisomesh.meshops.self_intersections import remove_self_intersections
 
 _MAX_HELD = 0.5  # share of the points of a decimation that are corners at most, to hold them
+_MAX_REPAIRS = 50  # pairs of intersecting triangles that are looked at before a mesh is fitted again
 _NO_EDGES: EdgeEnds = np.zeros((0, 2), dtype=np.int64)
 
 
@@ -38,8 +42,9 @@ def fit_without_faults(
 
     Notes
     -----
-    Where triangles are faulty after the fit, the points of the mesh and the edges between them are held, and the mesh
-    is fitted again: once with exchange of points, then twice without. If faults are left, the mesh itself is returned.
+    Where triangles are faulty after the fit they are repaired by local changes. If that does not help, the points of
+    the mesh there and the edges between them are held, and the mesh is fitted again: once with exchange of points, then
+    twice without. If faults are left, the mesh itself is returned.
 
     If the options say so, a decimation of the surface is fitted in the same way, and the mesh only if faults are left
     on that. On machine parts it ends nearer, because the triangles of least error are longer on developable parts than
@@ -74,6 +79,9 @@ def _fitted(
     for how in (options, options, without_exchange, without_exchange):
         fitted = fit_mesh(task, target.samples, how, deadline=deadline)
         faulty = faulty_faces(fitted, target.reference)
+        if len(faulty) > max_faults:
+            fitted = _repaired(fitted, target.reference, deadline)
+            faulty = faulty_faces(fitted, target.reference)
         if len(faulty) <= max_faults:
             return fitted
         near = _points_near(mesh, fitted, faulty)
@@ -81,6 +89,13 @@ def _fitted(
             near = _with_neighbours(mesh, near)
         task = replace(task, held=task.held | near, kept=task.kept | near[mesh.edges].all(axis=1))
     return None
+
+
+def _repaired(mesh: Surface, reference: ClosestPoints, deadline: Deadline) -> Surface:
+    """Return a mesh with faults removed by local changes, itself if that takes more points."""
+    points, faces, _ = remove_inverted_triangles(mesh.points, mesh.faces, reference, deadline=deadline)
+    points, faces, _ = remove_self_intersections(points, faces, reference, max_tries=_MAX_REPAIRS, deadline=deadline)
+    return Surface(points, faces) if len(points) == mesh.n_points else mesh
 
 
 def _points_near(mesh: Surface, fitted: Surface, faces: FaceLabels) -> PointMask:

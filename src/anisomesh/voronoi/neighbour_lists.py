@@ -11,8 +11,8 @@ from scipy.spatial import cKDTree
 from anisomesh._arrays import Sites
 from anisomesh._kernels import clip
 from anisomesh._kernels.neighbours import age_lists, displacements, limit_radius, refresh_lists, walk
+from anisomesh.threads import Workers
 from anisomesh.voronoi.blocks import Blocks
-from anisomesh.voronoi.threads import Workers
 
 # performance only: no value changes a result beyond rounding (benchmarks/speed.py)
 _BASE_NEIGHBOURS = 32  # entries of a new list

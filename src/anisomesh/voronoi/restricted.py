@@ -13,9 +13,9 @@ from anisomesh._arrays import Sites, SiteScalars
 from anisomesh._kernels import clip, diagram, integrate
 from anisomesh.errors import OptionError
 from anisomesh.mesh.embedded_surface import EmbeddedSurface
+from anisomesh.threads import Workers
 from anisomesh.voronoi.diagram import Diagram, DiagramPart, assemble
 from anisomesh.voronoi.neighbour_lists import NeighbourLists
-from anisomesh.voronoi.threads import Workers
 
 # facets per chunk: depends only on their number, so that sums do not depend on the number of threads; large, because a
 # thread that returns from a kernel may wait for the interpreter (benchmarks/speed.py)
