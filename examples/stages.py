@@ -59,7 +59,7 @@ def main(out: str = "stages.png", n_vertices: int = 600) -> anisomesh.Surface:
         task.reference,
         anisomesh.PlacedMetric(task.reference, field),
         n_vertices,
-        corners=features.corner_places(embedded.surface),
+        corners=task.corner_places,
     )
     fitted = anisomesh.fit_without_faults(dual, target, crease_edges=mesh.crease_edges)
     validity = check_validity(fitted, surface)

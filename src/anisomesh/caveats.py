@@ -4,13 +4,20 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 
+import numpy as np
+from scipy.spatial import cKDTree
+
+from anisomesh._arrays import Points
 from anisomesh.cvt.lbfgs import Optimised, Status
 from anisomesh.delaunay.meshing import ValidMesh
+from anisomesh.mesh.surface import Surface
 from anisomesh.mesh.validity import Validity
 from anisomesh.options import RemeshOptions
 from anisomesh.repair.prepare import PrepareReport
-from anisomesh.resolve import embedding_name
+from anisomesh.resolve import embedding_name, is_designed
 
+_AT_CORNER = 1e-6  # of the diagonal, within which a vertex is at a corner
+_VOLUME_TOLERANCE = 0.05  # share by which the enclosed volume may change without a remark
 COUNT_TOLERANCE = 0.02  # share of the vertices asked for by which a result may differ without a remark
 
 
@@ -21,6 +28,28 @@ def losses_of_repair(report: PrepareReport) -> Iterator[str]:
         yield f"the sheets that meet at {count:,} edges with more than two faces are separate in the result"
     if report.edges_nonorientable_cut:
         yield f"the surface has one side only, and was cut open along {report.edges_nonorientable_cut:,} edges"
+
+
+def losses_of_shape(surface: Surface, mesh: Surface, corner_places: Points) -> Iterator[str]:
+    """Yield one sentence for everything that a mesh has lost of the shape of a surface.
+
+    Parameters
+    ----------
+    surface, mesh
+        The surface and the mesh, in the same units.
+    corner_places
+        Where a designed surface has corners of creases and apexes (n, 3).
+    """
+    if len(corner_places) and is_designed(surface):
+        distance = cKDTree(mesh.points).query(corner_places)[0]
+        lost = np.count_nonzero(distance > _AT_CORNER * surface.diagonal)
+        if lost:
+            yield f"{lost:,} of {len(corner_places):,} corners have no vertex; ask for more vertices"
+    before, after = surface.volume, mesh.volume
+    if before is not None and after is not None and abs(after - before) > _VOLUME_TOLERANCE * abs(before) > 0.0:
+        change = abs(after - before) / abs(before)
+        word = "larger" if abs(after) > abs(before) else "smaller"
+        yield f"the enclosed volume is {change:.0%} {word} than before; ask for more vertices"
 
 
 def caveats(

@@ -9,7 +9,7 @@ import numpy as np
 import numpy.typing as npt
 
 from anisomesh._arrays import EdgeMask, PointMask
-from anisomesh.caveats import caveats, losses_of_repair
+from anisomesh.caveats import caveats, losses_of_repair, losses_of_shape
 from anisomesh.cvt.lbfgs import Optimised
 from anisomesh.cvt.schedule import DualFeedback, optimise_sites
 from anisomesh.deadline import Deadline
@@ -188,6 +188,7 @@ def _remesh(source: PreparedInput, n: int, options: RemeshOptions, run: Run, *, 
         seconds=run.total_seconds(),
         warnings=(
             *losses_of_repair(prepared.report),
+            *losses_of_shape(surface, Surface(mesh.points, mesh.faces), task.corner_places),
             *caveats(n, field.noise, mesh, validity, optimised, options),
         ),
     )
@@ -199,13 +200,12 @@ def _fit_target(
     """Return what meshes are fitted to, None if they are not; the field is on the working surface."""
     if options is None:
         return None
-    features = task.features
     return FitTarget.of(
         task.reference,
         PlacedMetric(ClosestPoints(working), field),
         task.n_vertices,
-        corners=features.corner_places(task.voronoi.embedded.surface),
-        holds_creases=bool(features.required.any()),
+        corners=task.corner_places,
+        holds_creases=bool(task.features.required.any()),
         options=options,
     )
 

@@ -106,6 +106,11 @@ class MeshingTask:
         return ClosestPoints(self.voronoi.embedded.surface)
 
     @cached_property
+    def corner_places(self) -> Points:
+        """Where there are corners of creases and apexes (n, 3)."""
+        return self.features.corner_places(self.voronoi.embedded.surface)
+
+    @cached_property
     def roots(self) -> PointTensors:
         """Symmetric square roots of the metric (V, 3, 3)."""
         return metric_root(self.tensors)

@@ -147,6 +147,14 @@ class Surface:
         return float(self.face_areas.sum())
 
     @cached_property
+    def volume(self) -> float | None:
+        """Enclosed volume, negative if the faces are oriented inwards; None if the surface has a boundary."""
+        if self.on_boundary.any():
+            return None
+        a, b, c = np.moveaxis(self.points[self.faces] - self.points[self.faces].mean(axis=(0, 1)), 1, 0)
+        return float(np.einsum("fx,fx->", a, np.cross(b, c)) / 6.0)
+
+    @cached_property
     def diagonal(self) -> float:
         """Length of the diagonal of the bounding box, in model units."""
         return float(np.linalg.norm(np.ptp(self.points, axis=0)))
