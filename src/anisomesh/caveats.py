@@ -16,7 +16,7 @@ from anisomesh.options import RemeshOptions
 from anisomesh.repair.prepare import PrepareReport
 from anisomesh.resolve import embedding_name, is_designed
 
-_AT_CORNER = 1e-6  # of the diagonal, within which a vertex is at a corner
+_AT_CORNER = 1e-3  # of the diagonal, within which a vertex is at a corner
 _VOLUME_TOLERANCE = 0.05  # share by which the enclosed volume may change without a remark
 COUNT_TOLERANCE = 0.02  # share of the vertices asked for by which a result may differ without a remark
 

@@ -107,8 +107,9 @@ class MeshingTask:
 
     @cached_property
     def corner_places(self) -> Points:
-        """Where there are corners of creases and apexes (n, 3)."""
-        return self.features.corner_places(self.voronoi.embedded.surface)
+        """Points of the surface that are corners of creases or apexes (n, 3)."""
+        places = self.features.corner_places(self.voronoi.embedded.surface)
+        return places[_renumbered(places, self.surface.points) >= 0]
 
     @cached_property
     def roots(self) -> PointTensors:

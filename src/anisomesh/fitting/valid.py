@@ -20,7 +20,7 @@ from anisomesh.meshops.inverted import remove_inverted_triangles
 from anisomesh.meshops.self_intersections import remove_self_intersections
 
 _MAX_HELD = 0.5  # share of the points of a decimation that are corners at most, to hold them
-_MAX_REPAIRS = 50  # pairs of intersecting triangles that are looked at before a mesh is fitted again
+_MAX_REPAIRS = 50  # faulty triangles up to which a mesh is repaired before it is fitted again
 _NO_EDGES: EdgeEnds = np.zeros((0, 2), dtype=np.int64)
 
 
@@ -79,7 +79,7 @@ def _fitted(
     for how in (options, options, without_exchange, without_exchange):
         fitted = fit_mesh(task, target.samples, how, deadline=deadline)
         faulty = faulty_faces(fitted, target.reference)
-        if len(faulty) > max_faults:
+        if max_faults < len(faulty) <= _MAX_REPAIRS:
             fitted = _repaired(fitted, target.reference, deadline)
             faulty = faulty_faces(fitted, target.reference)
         if len(faulty) <= max_faults:
