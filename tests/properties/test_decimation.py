@@ -156,8 +156,8 @@ def test_parts_of_long_triangles_are_decimated_as_well():
     """The caps of the cylinder are fans of needles, and its wall strips a hundred times as long as they are wide."""
     cylinder = trimesh.creation.cylinder(radius=0.1, height=1.0, sections=400)
     surface = Surface(np.array(cylinder.vertices), np.array(cylinder.faces))
-    result = decimated(surface, 60, corners(surface, sharp_edges(surface, 40.0)))
-    other = METHODS["vtk-quadric"].run(surface, 60, 0, {}).surface
+    result = decimated(surface, 120, corners(surface, sharp_edges(surface, 40.0)))
+    other = METHODS["vtk-quadric"].run(surface, 120, 0, {}).surface
     rms = [surface_distance(surface, mesh, samples=20_000).rms for mesh in (result, other)]
     assert rms[0] < 1.25 * rms[1]
-    assert result.volume == pytest.approx(surface.volume, rel=0.02)
+    assert result.volume == pytest.approx(surface.volume, rel=0.01)

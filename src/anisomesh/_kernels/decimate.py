@@ -12,7 +12,7 @@ _MAX_STEP = 1.0  # edge lengths from the middle of an edge to the place of its p
 _LENGTH_WEIGHT = 1e-9  # of squared lengths beside squared distances: orders the collapses in planes; heuristic
 _BOUNDARY_WEIGHT = 3.0  # of a boundary edge, in squared lengths; heuristic
 _MIN_COSINE = 0.2  # between the normals of a triangle before and after a collapse; heuristic
-_MIN_THICKNESS = 0.0001  # area over squared longest side of a new triangle, unless there was a thinner one; heuristic
+_MIN_THICKNESS = 1e-4  # area over squared longest side of a new triangle, unless there was a thinner one; heuristic
 
 
 class Decimation(NamedTuple):
