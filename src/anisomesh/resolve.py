@@ -118,20 +118,22 @@ def follows_creases(options: RemeshOptions) -> bool:
 def fit_options(options: RemeshOptions, surface: Surface, *, nearest: bool = False) -> FitOptions | None:
     """Return how the mesh is fitted to the prepared input at the end, None if it is not.
 
-    With the metric for the least distance, or if the distance is what is asked for, the error counts more than by
-    default, and on a designed surface a decimation is fitted. A density says where points go, so none are exchanged,
-    and an own energy has the last word.
+    With the metric for the least distance the error counts more than by default, and on a designed surface a decimation
+    is fitted; so it is on any surface if a distance is what is asked for (``nearest``). A density says where points go,
+    so none are exchanged and nothing is decimated, and an own energy has the last word.
     """
     if not is_fitted(options):
         return None
     named = isinstance(options.metric, str) and options.metric == "approximation"
-    nearest |= named or isinstance(options.metric, Approximation)
-    chosen = _with_options(_NEAREST if nearest else FitOptions(), options)
+    least_distance = nearest or named or isinstance(options.metric, Approximation)
+    chosen = _with_options(_NEAREST if least_distance else FitOptions(), options)
     if options.density is not None:
         return replace(chosen, rounds=0)
-    if not (nearest and is_designed(surface)):
-        return chosen
-    return replace(chosen, decimation=_with_options(_NEAREST_DECIMATION, options))
+    if nearest:
+        return replace(chosen, decimation=_with_options(_NEAREST, options))
+    if least_distance and is_designed(surface):
+        return replace(chosen, decimation=_with_options(_NEAREST_DECIMATION, options))
+    return chosen
 
 
 def _with_options(fit: FitOptions, options: RemeshOptions) -> FitOptions:

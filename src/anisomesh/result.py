@@ -47,7 +47,7 @@ class RemeshResult:
     embedding
         The embedding of ``working``.
     cells
-        The cell components of the restricted Voronoi diagram that the result is dual to.
+        The cell components of the restricted Voronoi diagram, to which the mesh before the fit is dual.
     vertices_asked
         The vertex count asked for.
     energy, iterations, status
@@ -91,7 +91,7 @@ class RemeshResult:
 
     @property
     def diagram(self) -> Diagram:
-        """The restricted Voronoi diagram that the result is dual to."""
+        """The restricted Voronoi diagram, to which the mesh before the fit is dual."""
         return self.cells.diagram
 
     @property

@@ -17,6 +17,7 @@ MAX_SEARCH_RUNS = 16  # heuristic; ten are usual
 COUNT_PRECISION = 1.03  # the search ends when a count smaller by this factor is known to be too small
 FIRST_RATIO = 0.1  # vertices per vertex of the surface, for the first run; heuristic
 MAX_RATIO, MAX_MORE = 4, 1_000  # largest count: ratio times the vertices of the surface, and more
+_ENDED = "the time limit ended the search for fewer vertices"
 DISTANCE_SAMPLES = 50_000  # points on each surface besides vertices and edge midpoints; the largest are followed
 
 
@@ -55,18 +56,23 @@ def smallest_within(
 
     most = MAX_RATIO * surface.n_points + MAX_MORE
     first = max(MIN_VERTICES, round(FIRST_RATIO * surface.n_points))
+    prepared_count = max(surface.n_points, MIN_VERTICES)
     try:
-        n, error = smallest_count(error_at, max_error, first, MIN_VERTICES, most, stop=deadline.passed)
+        n, error = smallest_count(
+            error_at, max_error, first, MIN_VERTICES, most, milestone=prepared_count, stop=deadline.passed
+        )
     except TimeLimitError:
         if not results:
             raise
         found = next(iter(results.values()))
-        return replace(found, warnings=(*found.warnings, "the time limit ended the search for fewer vertices"))
+        return replace(found, warnings=(*found.warnings, _ENDED))
     if n not in results:
         raise OptionError(
             f"max_error = {max_error:g} is not reached: with {n:,} vertices the distance is {error:g}; allow more"
         )
     result = results[n]
+    if deadline.passed():
+        result = replace(result, warnings=(*result.warnings, _ENDED))
     if n > surface.n_points:
         more = f"the distance takes more vertices than the input has ({n:,} for {surface.n_points:,})"
         result = replace(result, warnings=(*result.warnings, more))
@@ -80,6 +86,7 @@ def smallest_count(
     least: int,
     most: int,
     *,
+    milestone: int = 0,
     stop: Callable[[], bool] = lambda: False,
 ) -> tuple[int, float]:
     """Return the smallest count found with an error of at most ``max_error``, and that error.
@@ -92,6 +99,8 @@ def smallest_count(
         The error allowed.
     first, least, most
         The first count tried, the smallest, and the largest.
+    milestone
+        A count that is tried before any larger one.
     stop
         Whether to end now, asked once a sufficient count is known.
 
@@ -119,6 +128,8 @@ def smallest_count(
         if low is not None and (low[0] == most or (high is not None and _close(low[0], high[0]))):
             break
         n = _next(low, high, max_error, least, most)
+        if n > milestone and (low is None or low[0] < milestone):
+            n = max(milestone, least)
         error = error_at(n)
     else:
         if error <= max_error:

@@ -73,3 +73,11 @@ def test_parts_are_about_as_near_as_by_quadric_decimation_with_better_triangles(
     assert mine.shape.g_mean > theirs.shape.g_mean + 0.05
     assert result.surface.n_points == 300
     assert result.validity.inverted == result.validity.new_intersections == result.validity.flat == 0
+
+
+def test_the_tip_of_a_needle_is_not_drawn_out():
+    """Beyond a tip the planes of the samples go on; a vertex was 3.6 radii outside."""
+    sphere = shapes.sphere(3)
+    needle = sphere.with_points(sphere.points * [1.0, 0.003, 0.003])
+    result = anisomesh.remesh(needle, n_vertices=200, embedding="direct")
+    assert np.abs(result.surface.points[:, 0]).max() < 1.006

@@ -5,6 +5,7 @@ from types import SimpleNamespace
 
 import numpy as np
 import pytest
+import trimesh
 from edge_distance import distance_to_edges
 
 import anisomesh
@@ -12,7 +13,7 @@ from anisomesh.deadline import Deadline
 from anisomesh.errors import AnisomeshError, OptionError, TimeLimitError
 from anisomesh.features.detect import points_along
 from anisomesh.mesh import topology
-from anisomesh.mesh.distance import surface_distance
+from anisomesh.mesh.distance import hausdorff_distance, surface_distance
 from anisomesh.mesh.surface import Surface
 from anisomesh.search import smallest_within
 from anisomesh.shapes.analytic import cad_features, cad_part, cylinder, ellipsoid, open_patch, sphere, torus
@@ -217,3 +218,13 @@ def test_one_of_the_ways_to_ask_is_wanted():
     for asked in ({}, {"n_vertices": 9, "max_error": 0.1}, {"ratio": 0.1, "max_error": 0.1}):
         with pytest.raises(AnisomeshError, match="one of n_vertices, ratio and max_error"):
             anisomesh.remesh(sphere(1), **asked)
+
+
+@pytest.mark.parametrize("sections", [24, 48])
+def test_a_part_within_a_distance_never_takes_more_vertices_than_it_has(sections):
+    cylinder = trimesh.creation.cylinder(radius=0.5, height=2.0, sections=sections)
+    part = anisomesh.Surface(np.array(cylinder.vertices), np.array(cylinder.faces))
+    bound = 0.003 * part.diagonal
+    result = anisomesh.remesh(part, max_error=bound, embedding="direct")
+    assert result.surface.n_points < 0.7 * part.n_points
+    assert hausdorff_distance(part, result.surface, samples=100_000, seed=1) < 1.02 * bound

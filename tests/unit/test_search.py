@@ -57,3 +57,16 @@ def test_the_search_stops_early_only_with_a_sufficient_count():
     assert error <= 1.0
     assert n == tried[-1]
     assert tried[:-1] == [n for n in tried if n < 1000]
+
+
+def test_a_milestone_is_tried_before_any_larger_count():
+    """The error is low at the milestone only, as for a decimation that ends at the input itself."""
+    tried = []
+
+    def error_at(n):
+        tried.append(n)
+        return 0.0 if n == 100 else 5.0 / n if n > 100 else 1.0
+
+    n, error = smallest_count(error_at, 0.01, 10, 4, 10_000, milestone=100)
+    assert (n, error) == (100, 0.0)
+    assert max(tried) == 100

@@ -23,6 +23,7 @@ _SMOOTH_COSINE = 0.9  # between the normals of a patch, above which the nearest 
 _MIN_SAMPLE_COSINE = 0.3  # between the normal of a triangle and the sum over its samples; heuristic
 _MAX_AREA_FACTOR = 2.0  # area of a triangle over the area that its samples stand for; heuristic
 _PULL = 1e-3  # of a new place towards the one before it, over the trace of the matrix of the fit
+_MAX_GAP = 6.25  # squared distance of a place on the surface from the nearest sample, over the area of one; heuristic
 _AREA_SLACK = 3.0  # samples that this leaves out: a triangle between samples; heuristic
 
 
@@ -226,20 +227,25 @@ def fit_system(fit, m, owners, point):
 
 @kernel
 def off_samples(fit, m, place, before, max_square):
-    """Return whether a place is farther than a distance from the plane of the sample nearest to it.
+    """Return whether a place is farther than a distance from the plane of the sample nearest to it, or off all samples.
 
-    A place that is nearer than the one before is not off.
+    A place that is nearer than the one before is not off. Beyond a tip the planes of the samples go on, but the samples
+    do not.
     """
-    square = _plane_square(fit, m, place)
-    return square > max_square and square > _plane_square(fit, m, before)
+    square = _off_square(fit, m, place)
+    return square > max_square and square > _off_square(fit, m, before)
 
 
 @kernel
-def _plane_square(fit, m, place):
-    """Return the squared distance of a place from the plane of the nearest of the members."""
+def _off_square(fit, m, place):
+    """Return the squared distance of a place from the plane of the nearest of the members.
+
+    If that is farther than samples are from each other it is the squared distance beyond.
+    """
     samples, nearest = fit.samples, _nearest_member(fit, m, place)
-    height = dot(subtract(coordinates(samples.points, nearest), place), coordinates(samples.normals, nearest))
-    return height * height
+    offset = subtract(coordinates(samples.points, nearest), place)
+    height = dot(offset, coordinates(samples.normals, nearest))
+    return max(height * height, squared_length(offset) - _MAX_GAP * samples.weights[0])
 
 
 @kernel

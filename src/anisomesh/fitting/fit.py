@@ -11,6 +11,7 @@ from anisomesh.mesh.surface import Surface
 
 _FIRST_SWEEPS, _ROUND_SWEEPS, _LAST_SWEEPS = 4, 2, 8  # at most
 _RISE = (1.0, 3.0, 10.0, 30.0)  # steps of a price that rises
+_MAX_ERROR_FACTOR = 1.5  # root mean squared error over the one at the start, up to which a price rises
 _MIN_SWEEP_GAIN = 5e-3  # of the energy in a sweep, below which it is the last
 
 
@@ -30,7 +31,8 @@ class FitOptions:
     share
         Points added and removed in a round, of all points.
     min_quality
-        Mean quality up to which the price rises, to 30 times what it is; 0 for a price that stays.
+        Mean quality up to which the price rises: to 30 times what it is at most, and as long as the root mean squared
+        error is not 1.5 times the one at the start. 0 for a price that stays.
     decimation
         How a decimation of the surface is fitted in place of a mesh; None to fit the mesh.
     crease_angle
@@ -89,9 +91,14 @@ def fit_mesh(
     options = FitOptions() if options is None else options
     count = int(options.share * task.mesh.n_points) + 1 if options.rounds else 0
     state = FitState(task, samples, n_spare=count, threads=options.threads)
-    for factor in _RISE if options.min_quality > 0.0 else (1.0,):
+    largest = _MAX_ERROR_FACTOR**2 * state.mean_square
+    for factor in _RISE:
+        saved = state.saved()
         _fit_at(state, options, factor * state.mean_triangle_error, count, deadline)
-        if deadline.passed() or (factor >= 1.0 and state.mean_quality >= options.min_quality):
+        if factor > 1.0 and state.present_mean_square > largest:
+            state.restore(saved)
+            break
+        if deadline.passed() or state.mean_quality >= options.min_quality:
             break
     return state.surface()
 

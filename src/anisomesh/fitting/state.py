@@ -91,6 +91,11 @@ class FitState:
         return float(fit_samples.fit_error(self.fit))
 
     @property
+    def present_mean_square(self) -> float:
+        """Mean squared distance of the samples."""
+        return self.error / self._area
+
+    @property
     def mean_triangle_error(self) -> float:
         """Error at the start for each triangle, at least the one that counts as exact."""
         return self.mean_square * self._area / max(self._count_faces(), 1)

@@ -79,7 +79,7 @@ def _fitted(
     for how in (options, options, without_exchange, without_exchange):
         fitted = fit_mesh(task, target.samples, how, deadline=deadline)
         faulty = faulty_faces(fitted, target.reference)
-        if max_faults < len(faulty) <= _MAX_REPAIRS:
+        if max_faults < len(faulty) <= _MAX_REPAIRS and not task.kept.any():
             fitted = _repaired(fitted, target.reference, deadline)
             faulty = faulty_faces(fitted, target.reference)
         if len(faulty) <= max_faults:
