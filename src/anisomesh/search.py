@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from math import exp, log
 
 from anisomesh.deadline import Deadline
@@ -19,6 +19,16 @@ FIRST_RATIO = 0.1  # vertices per vertex of the surface, for the first run; heur
 MAX_RATIO, MAX_MORE = 4, 1_000  # largest count: ratio times the vertices of the surface, and more
 _ENDED = "the time limit ended the search for fewer vertices"
 DISTANCE_SAMPLES = 50_000  # points on each surface besides vertices and edge midpoints; the largest are followed
+
+
+@dataclass(frozen=True, kw_only=True)
+class Counts:
+    """The counts of a search: the first one tried, the smallest, the largest, and one tried before any larger one."""
+
+    first: int
+    least: int
+    most: int
+    milestone: int = 0
 
 
 def smallest_within(
@@ -54,13 +64,14 @@ def smallest_within(
             results[n] = replace(result, distance=error)  # only the last sufficient result is kept
         return error
 
-    most = MAX_RATIO * surface.n_points + MAX_MORE
-    first = max(MIN_VERTICES, round(FIRST_RATIO * surface.n_points))
-    prepared_count = max(surface.n_points, MIN_VERTICES)
+    counts = Counts(
+        first=max(MIN_VERTICES, round(FIRST_RATIO * surface.n_points)),
+        least=MIN_VERTICES,
+        most=MAX_RATIO * surface.n_points + MAX_MORE,
+        milestone=surface.n_points,
+    )
     try:
-        n, error = smallest_count(
-            error_at, max_error, first, MIN_VERTICES, most, milestone=prepared_count, stop=deadline.passed
-        )
+        n, error = smallest_count(error_at, max_error, counts, stop=deadline.passed)
     except TimeLimitError:
         if not results:
             raise
@@ -82,11 +93,8 @@ def smallest_within(
 def smallest_count(
     error_at: Callable[[int], float],
     max_error: float,
-    first: int,
-    least: int,
-    most: int,
+    counts: Counts,
     *,
-    milestone: int = 0,
     stop: Callable[[], bool] = lambda: False,
 ) -> tuple[int, float]:
     """Return the smallest count found with an error of at most ``max_error``, and that error.
@@ -97,10 +105,8 @@ def smallest_count(
         The error for a count; it decreases about as a power of the count, not monotonically.
     max_error
         The error allowed.
-    first, least, most
-        The first count tried, the smallest, and the largest.
-    milestone
-        A count that is tried before any larger one.
+    counts
+        The counts that are allowed.
     stop
         Whether to end now, asked once a sufficient count is known.
 
@@ -114,7 +120,8 @@ def smallest_count(
     The answer is bracketed by a too small and a sufficient count, and the bracket shrunk by the secant through both in
     logarithms, until its ends are within 3 % of each other.
     """
-    n = min(max(first, least), most)
+    least, most = counts.least, counts.most
+    n = min(max(counts.first, least), most)
     error = error_at(n)
     low: tuple[int, float] | None = None
     high: tuple[int, float] | None = None
@@ -128,8 +135,8 @@ def smallest_count(
         if low is not None and (low[0] == most or (high is not None and _close(low[0], high[0]))):
             break
         n = _next(low, high, max_error, least, most)
-        if n > milestone and (low is None or low[0] < milestone):
-            n = max(milestone, least)
+        if n > counts.milestone and (low is None or low[0] < counts.milestone):
+            n = max(counts.milestone, least)
         error = error_at(n)
     else:
         if error <= max_error:

@@ -127,6 +127,13 @@ def test_no_sample_is_refused():
 
 
 @pytest.mark.parametrize("seed", range(5))
+def test_no_place_off_the_surface_is_taken_for_a_maximum(seed):
+    """A step out of the triangle on all three sides at once gave the origin, which may be far from both surfaces."""
+    ball = sphere(2)
+    assert hausdorff_distance(ball, ball, samples=100, seed=seed) < 1e-7
+
+
+@pytest.mark.parametrize("seed", range(5))
 def test_the_hausdorff_distance_is_found_between_samples(seed):
     """A bump off the middle of one large triangle, narrower than the distance of samples, is farthest at its tip."""
     rng = np.random.default_rng(seed)

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from anisomesh.search import COUNT_PRECISION, smallest_count
+from anisomesh.search import COUNT_PRECISION, Counts, smallest_count
 from conftest import pairwise
 
 
@@ -22,7 +22,7 @@ def counted(function):
 )
 def test_the_smallest_count_is_found_to_three_per_cent(power, answer, first):
     error_at, tried = counted(lambda n: (answer / n) ** power)
-    n, error = smallest_count(error_at, 1.0, first, 4, 100_000)
+    n, error = smallest_count(error_at, 1.0, Counts(first=first, least=4, most=100_000))
     assert error == error_at(n) <= 1.0
     assert answer <= n <= max(answer + 1, COUNT_PRECISION * answer)
     assert len(tried) <= 17
@@ -33,7 +33,7 @@ def test_a_noisy_error_still_gives_a_sufficient_count(seed):
     rng = np.random.default_rng(seed)
     noise = rng.uniform(0.8, 1.25, 10_001)
     error_at, tried = counted(lambda n: 500 / n * noise[n])
-    n, error = smallest_count(error_at, 1.0, 100, 4, 10_000)
+    n, error = smallest_count(error_at, 1.0, Counts(first=100, least=4, most=10_000))
     assert error == 500 / n * noise[n] <= 1.0
     assert 400 <= n <= 640
     assert len(set(tried)) == len(tried) <= 17
@@ -41,19 +41,19 @@ def test_a_noisy_error_still_gives_a_sufficient_count(seed):
 
 def test_an_error_out_of_reach_returns_the_largest_count():
     error_at, tried = counted(lambda n: 2.0)
-    assert smallest_count(error_at, 1.0, 100, 4, 5_000) == (5_000, 2.0)
+    assert smallest_count(error_at, 1.0, Counts(first=100, least=4, most=5_000)) == (5_000, 2.0)
     assert max(tried) == 5_000
 
 
 def test_the_smallest_allowed_count_is_returned_if_sufficient():
     error_at, tried = counted(lambda n: 0.0)
-    assert smallest_count(error_at, 1.0, 100, 4, 5_000) == (4, 0.0)
+    assert smallest_count(error_at, 1.0, Counts(first=100, least=4, most=5_000)) == (4, 0.0)
     assert len(tried) < 10
 
 
 def test_the_search_stops_early_only_with_a_sufficient_count():
     error_at, tried = counted(lambda n: 1000 / n)
-    n, error = smallest_count(error_at, 1.0, 100, 4, 5_000, stop=lambda: True)
+    n, error = smallest_count(error_at, 1.0, Counts(first=100, least=4, most=5_000), stop=lambda: True)
     assert error <= 1.0
     assert n == tried[-1]
     assert tried[:-1] == [n for n in tried if n < 1000]
@@ -67,6 +67,6 @@ def test_a_milestone_is_tried_before_any_larger_count():
         tried.append(n)
         return 0.0 if n == 100 else 5.0 / n if n > 100 else 1.0
 
-    n, error = smallest_count(error_at, 0.01, 10, 4, 10_000, milestone=100)
+    n, error = smallest_count(error_at, 0.01, Counts(first=10, least=4, most=10_000, milestone=100))
     assert (n, error) == (100, 0.0)
     assert max(tried) == 100

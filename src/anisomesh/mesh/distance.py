@@ -124,9 +124,10 @@ def _farthest(a: Surface, b: Surface, samples: int, rng: np.random.Generator) ->
     face, weights, found = face[largest], weights[largest], found[largest]
     rows = np.arange(len(face))
     for step in _CLIMB_STEPS:
-        moved = weights[:, None] + step * rng.normal(size=(len(face), _N_MOVES, 3))
-        moved = np.maximum(moved, 0.0)
-        moved /= np.maximum(moved.sum(axis=2, keepdims=True), 1e-300)
+        moved = np.maximum(weights[:, None] + step * rng.normal(size=(len(face), _N_MOVES, 3)), 0.0)
+        outside = moved.sum(axis=2) <= 0.0
+        moved[outside] = np.broadcast_to(weights[:, None], moved.shape)[outside]
+        moved /= moved.sum(axis=2, keepdims=True)
         tried = squares(np.repeat(face, _N_MOVES), moved.reshape(-1, 3)).reshape(-1, _N_MOVES)
         best = tried.argmax(axis=1)
         better = tried[rows, best] > found
