@@ -51,6 +51,7 @@ def test_another_value_of_fit_is_refused(fit):
         anisomesh.RemeshOptions(fit=fit)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", ["ellipsoid", "part"])
 def test_the_metric_for_the_least_distance_is_nearer(name):
     make, n = SHAPES[name]
@@ -75,6 +76,7 @@ def test_parts_are_about_as_near_as_by_quadric_decimation_with_better_triangles(
     assert result.validity.inverted == result.validity.new_intersections == result.validity.flat == 0
 
 
+@pytest.mark.slow
 def test_the_tip_of_a_needle_is_not_drawn_out():
     """Beyond a tip the planes of the samples go on; a vertex was 3.6 radii outside."""
     sphere = shapes.sphere(3)

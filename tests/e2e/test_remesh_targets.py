@@ -220,11 +220,11 @@ def test_one_of_the_ways_to_ask_is_wanted():
             anisomesh.remesh(sphere(1), **asked)
 
 
-@pytest.mark.parametrize(("sections", "share"), [(24, 1.0), (48, 0.5)])
-def test_a_part_within_a_distance_never_takes_more_vertices_than_it_has(sections, share):
-    cylinder = trimesh.creation.cylinder(radius=0.5, height=2.0, sections=sections)
+@pytest.mark.slow
+def test_a_part_within_a_distance_takes_fewer_vertices_than_it_has():
+    cylinder = trimesh.creation.cylinder(radius=0.5, height=2.0, sections=48)
     part = anisomesh.Surface(np.array(cylinder.vertices), np.array(cylinder.faces))
     bound = 0.003 * part.diagonal
     result = anisomesh.remesh(part, max_error=bound, embedding="direct")
-    assert result.surface.n_points <= share * part.n_points
+    assert result.surface.n_points < 0.5 * part.n_points
     assert hausdorff_distance(part, result.surface, samples=100_000, seed=1) < 1.02 * bound

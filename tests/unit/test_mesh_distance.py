@@ -129,7 +129,7 @@ def test_no_sample_is_refused():
 def test_no_place_off_the_surface_is_taken_for_a_maximum():
     """A step out of a triangle on all three sides at once gave the origin, which may be far from both surfaces."""
     ball = sphere(0)
-    assert max(hausdorff_distance(ball, ball, samples=1_000, seed=seed) for seed in range(100)) < 1e-7
+    assert max(hausdorff_distance(ball, ball, samples=1_000, seed=seed) for seed in range(50)) < 1e-7
 
 
 @pytest.mark.parametrize("seed", range(5))

@@ -51,18 +51,19 @@ def fit_without_faults(
     an embedding reproduces.
     """
     max_faults = len(faulty_faces(mesh, target.reference))
-    start = _decimated(target, mesh.n_points)
-    fitted = None if start is None else _fitted(start, target, target.options.decimation, max_faults, deadline)
+    fitted = None
+    if target.options.decimation is not None and not target.holds_creases:
+        start = _decimated(target, mesh.n_points)
+        if start is not None:
+            fitted = _fitted(start, target, target.options.decimation, max_faults, deadline)
     if fitted is None:
         fitted = _fitted(target.task(mesh, crease_edges), target, target.options, max_faults, deadline)
     return mesh if fitted is None else fitted
 
 
 def _decimated(target: FitTarget, n_points: int) -> FitTask | None:
-    """Return the task to fit the surface decimated to this many points, None if that is not wanted or not possible."""
+    """Return the task to fit the surface decimated to this many points, None if that is not possible."""
     surface = target.reference.surface
-    if target.options.decimation is None or target.holds_creases:
-        return None
     held = target.at_corners(surface.points)
     if np.count_nonzero(held) > _MAX_HELD * n_points:
         held[:] = False
@@ -71,11 +72,10 @@ def _decimated(target: FitTarget, n_points: int) -> FitTask | None:
 
 
 def _fitted(
-    task: FitTask, target: FitTarget, options: FitOptions | None, max_faults: int, deadline: Deadline
+    task: FitTask, target: FitTarget, options: FitOptions, max_faults: int, deadline: Deadline
 ) -> Surface | None:
     """Return the mesh of a task fitted with no more than this many faults, None if that does not succeed."""
-    mesh, options = task.mesh, options or FitOptions()
-    without_exchange = replace(options, rounds=0)
+    mesh, without_exchange = task.mesh, replace(options, rounds=0)
     for how in (options, options, without_exchange, without_exchange):
         fitted = fit_mesh(task, target.samples, how, deadline=deadline)
         faulty = faulty_faces(fitted, target.reference)
