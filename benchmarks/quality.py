@@ -134,7 +134,7 @@ def measure(run: Run) -> dict[str, Any]:
         "g_working": quality_in_own_metric(result),
         "flat_quality": flat_quality(result),
         "mean_square": distance.mean_square_ab + distance.mean_square_ba,
-        "over_quadric": (distance.rms * result.prepared.diagonal + EXACT) / (quadric.rms + EXACT),
+        "over_quadric": (distance.rms + EXACT) / (quadric.rms / result.prepared.diagonal + EXACT),
         "hausdorff": distance.hausdorff,
         "creases": evaluation.features.crease_covered,
         **result.report(),
@@ -256,10 +256,10 @@ def geometric_mean(rows: list[dict[str, Any]], name: str) -> float:
     return float(np.exp(np.mean(np.log([max(row[name], 1e-16) for row in rows]))))
 
 
-def read_rows(path: Path) -> list[dict[str, Any]]:
-    """Return the rows of earlier calls; rows of versions with other names of the figures are left out."""
+def read_rows(path: Path, newest: str = "over_quadric") -> list[dict[str, Any]]:
+    """Return the rows of earlier calls that have the figure added last; the ones of older versions are left out."""
     rows = [json.loads(line) for line in path.read_text().splitlines()] if path.exists() else []
-    return [row for row in rows if "over_quadric" in row]
+    return [row for row in rows if newest in row]
 
 
 def main() -> None:
@@ -313,7 +313,7 @@ def main() -> None:
     rows = [row for row in rows if key_of(row) in asked]
     print(tables(rows))
     if options.before is not None:
-        print(comparison(read_rows(options.before), rows), sep="\n")
+        print(comparison(read_rows(options.before, newest="flat_quality"), rows), sep="\n")
 
 
 if __name__ == "__main__":

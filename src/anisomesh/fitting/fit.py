@@ -93,9 +93,9 @@ def fit_mesh(
     state = FitState(task, samples, n_spare=count, threads=options.threads)
     largest = _MAX_ERROR_FACTOR**2 * state.mean_square
     for factor in _RISE:
-        saved = state.saved()
+        saved = state.saved() if factor > 1.0 else None
         _fit_at(state, options, factor * state.mean_triangle_error, count, deadline)
-        if factor > 1.0 and state.present_mean_square > largest:
+        if saved is not None and state.present_mean_square > largest:
             state.restore(saved)
             break
         if deadline.passed() or state.mean_quality >= options.min_quality:
