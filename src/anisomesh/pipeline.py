@@ -20,7 +20,7 @@ from anisomesh.embedding.embedder import checked_embedding
 from anisomesh.errors import OptionError
 from anisomesh.features.detect import WEAK_ANGLE, apexes, sharp_edges
 from anisomesh.features.network import FeatureNetwork, trace_features
-from anisomesh.fitting.fit import FitOptions
+from anisomesh.fitting.fit import FitPlan
 from anisomesh.fitting.target import FitTarget
 from anisomesh.fitting.valid import fit_without_faults
 from anisomesh.inputs import PreparedInput, prepared_input
@@ -42,7 +42,7 @@ from anisomesh.resolve import (
     cvt_options,
     embedder,
     embedding_name,
-    fit_options,
+    fit_plan,
     follows_creases,
     metric_source,
     with_embedding_chosen,
@@ -161,7 +161,8 @@ def _remesh(source: PreparedInput, n: int, options: RemeshOptions, run: Run, *, 
             n_vertices=n,
             deadline=run.deadline,
         )
-        target = _fit_target(task, working, field, fit_options(options, surface, nearest=nearest))
+        plan = fit_plan(options, surface, nearest=nearest)
+        target = None if plan is None else _fit_target(task, working, field, plan, options.feature_angle)
     run.check_time()
     made = _valid_mesh(task, target, options, run)
     mesh, optimised, validity = made.mesh, made.optimised, made.validity
@@ -195,18 +196,17 @@ def _remesh(source: PreparedInput, n: int, options: RemeshOptions, run: Run, *, 
 
 
 def _fit_target(
-    task: MeshingTask, working: Surface, field: MetricField, options: FitOptions | None
-) -> FitTarget | None:
-    """Return what meshes are fitted to, None if they are not; the field is on the working surface."""
-    if options is None:
-        return None
+    task: MeshingTask, working: Surface, field: MetricField, plan: FitPlan, crease_angle: float
+) -> FitTarget:
+    """Return what meshes are fitted to; the field is on the working surface."""
     return FitTarget.of(
         task.reference,
         PlacedMetric(ClosestPoints(working), field),
         task.n_vertices,
         corners=task.corner_places,
         holds_creases=bool(task.features.required.any()),
-        options=options,
+        crease_angle=crease_angle,
+        plan=plan,
     )
 
 

@@ -10,7 +10,7 @@ from anisomesh.cvt.energy import Energy, NormalMetric
 from anisomesh.cvt.schedule import CVTOptions
 from anisomesh.embedding.embedder import Direct, Embedder
 from anisomesh.features.detect import share_of_flat_edges
-from anisomesh.fitting.fit import FitOptions
+from anisomesh.fitting.fit import FitOptions, FitPlan
 from anisomesh.learn import torch_is_there
 from anisomesh.learn.inference.source import Hybrid, Neural
 from anisomesh.mesh.surface import Surface
@@ -115,7 +115,7 @@ def follows_creases(options: RemeshOptions) -> bool:
     return energy(options) != NormalMetric(1.0)
 
 
-def fit_options(options: RemeshOptions, surface: Surface, *, nearest: bool = False) -> FitOptions | None:
+def fit_plan(options: RemeshOptions, surface: Surface, *, nearest: bool = False) -> FitPlan | None:
     """Return how the mesh is fitted to the prepared input at the end, None if it is not.
 
     With the metric for the least distance the error counts more than by default, and on a designed surface a decimation
@@ -126,18 +126,14 @@ def fit_options(options: RemeshOptions, surface: Surface, *, nearest: bool = Fal
         return None
     named = isinstance(options.metric, str) and options.metric == "approximation"
     least_distance = nearest or named or isinstance(options.metric, Approximation)
-    chosen = _with_options(_NEAREST if least_distance else FitOptions(), options)
+    chosen, decimation = _NEAREST if least_distance else FitOptions(), None
     if options.density is not None:
-        return replace(chosen, rounds=0)
-    if nearest:
-        return replace(chosen, decimation=_with_options(_NEAREST, options))
-    if least_distance and is_designed(surface):
-        return replace(chosen, decimation=_with_options(_NEAREST_DECIMATION, options))
-    return chosen
-
-
-def _with_options(fit: FitOptions, options: RemeshOptions) -> FitOptions:
-    return replace(fit, crease_angle=options.feature_angle, threads=options.threads)
+        chosen = replace(chosen, rounds=0)
+    elif nearest:
+        decimation = _NEAREST
+    elif least_distance and is_designed(surface):
+        decimation = _NEAREST_DECIMATION
+    return FitPlan(mesh=chosen, decimation=decimation, threads=options.threads)
 
 
 def is_fitted(options: RemeshOptions) -> bool:

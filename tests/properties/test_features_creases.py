@@ -13,7 +13,7 @@ from anisomesh.mesh import topology
 from anisomesh.mesh.closest_points import ClosestPoints
 from anisomesh.mesh.embedded_surface import EmbeddedSurface
 from anisomesh.mesh.surface import Surface
-from anisomesh.meshops.collapse import decimate
+from anisomesh.meshops.decimation import decimate
 from anisomesh.meshops.edge_recovery import recover_edges
 from anisomesh.meshops.flip import flip_for_shape
 from anisomesh.shapes.analytic import box, cad_part, cylinder, open_patch, sphere
@@ -174,9 +174,10 @@ def test_collapses_and_flips_keep_required_edges_in_place():
     keys = topology.edge_keys(links)
     assert np.isin(keys, topology.edge_keys(surface.edges)).all()
     reference = ClosestPoints(surface)
-    points, faces, left = decimate(surface.points, surface.faces, 30, reference, creases=links)
-    assert len(points) <= 32
-    after = Surface(points, faces)
+    decimated = decimate(surface, 30, crease_edges=links)
+    after, left = decimated.surface, decimated.crease_edges
+    points, faces = after.points, after.faces
+    assert len(points) == 30
     assert np.isin(topology.edge_keys(left), topology.edge_keys(after.edges)).all()
     ends = points[left]
     assert np.abs(ends[:, :, 0] - ends[:, :, 1]).max() < 1e-12

@@ -9,8 +9,7 @@ from hypothesis import strategies as st
 
 from anisomesh._kernels import fit_moves, vectors
 from anisomesh.features.detect import corners, sharp_edges
-from anisomesh.fitting.decimation import decimated
-from anisomesh.fitting.fit import FitOptions, fit_mesh
+from anisomesh.fitting.fit import FitOptions, FitPlan, fit_mesh
 from anisomesh.fitting.samples import sample_surface
 from anisomesh.fitting.state import FitState
 from anisomesh.fitting.target import FitTarget
@@ -20,6 +19,7 @@ from anisomesh.mesh.distance import surface_distance
 from anisomesh.mesh.surface import Surface
 from anisomesh.mesh.topology import euler_characteristic, is_oriented
 from anisomesh.mesh.validity import faulty_faces
+from anisomesh.meshops.decimation import Decimated, decimate
 from anisomesh.metric.field import MetricField
 from anisomesh.metric.quality import anisotropic_quality
 from anisomesh.metric.transfer import PlacedMetric
@@ -44,7 +44,7 @@ def target_of(surface, tensor=None, crease_angle=40.0, count=20_000):
         reference=reference,
         samples=samples,
         corners=surface.points[corners(surface, sharp)],
-        options=FitOptions(crease_angle=crease_angle),
+        crease_angle=crease_angle,
     )
 
 
@@ -277,22 +277,23 @@ def test_a_fit_that_leaves_faults_gives_the_mesh_itself(monkeypatch):
 
 def test_a_decimation_is_fitted_where_the_options_say_so_and_faults_leave_the_mesh(monkeypatch):
     part = cad_part(8)
-    mesh = shaken(decimated(part, 200, corners(part, sharp_edges(part, 40.0))), 0.0)
+    mesh = shaken(decimate(part, 200, held=corners(part, sharp_edges(part, 40.0))).surface, 0.0)
     target = target_of(part)
-    options = FitOptions(decimation=FitOptions(price=10.0, min_quality=0.75))
-    nearest = dataclasses.replace(target, options=options)
+    plan = FitPlan(decimation=FitOptions(price=10.0, min_quality=0.75))
+    nearest = dataclasses.replace(target, plan=plan)
     fitted = fit_without_faults(mesh, nearest, crease_edges=NO_EDGES)
     alone = fit_without_faults(mesh, target, crease_edges=NO_EDGES)
     assert fitted.n_points == alone.n_points == 200
     assert not np.array_equal(fitted.points, alone.points)
-    monkeypatch.setattr("anisomesh.fitting.valid.decimated", lambda surface, n_points, held: None)
+    undecimated = Decimated(surface=part, crease_edges=NO_EDGES)
+    monkeypatch.setattr("anisomesh.fitting.valid.decimate", lambda surface, n_points, held: undecimated)
     again = fit_without_faults(mesh, nearest, crease_edges=NO_EDGES)
     np.testing.assert_array_equal(again.points, alone.points)
 
 
 def test_the_price_rises_until_the_triangles_are_good_enough():
     surface = shapes.ellipsoid(subdivisions=4)
-    start = decimated(surface, 200, np.zeros(surface.n_points, dtype=bool))
+    start = decimate(surface, 200).surface
     target = target_of(surface)
     task = target.task(start, NO_EDGES)
     wanted = (0.0, 0.95)
@@ -305,7 +306,7 @@ def test_the_price_rises_until_the_triangles_are_good_enough():
 def test_a_fit_gives_the_same_bits_with_any_number_of_threads():
     surface = shapes.ellipsoid(subdivisions=4)
     mesh, target = shaken(surface, 0.1), target_of(surface, count=20_000)
-    results = [fit_mesh(target.task(mesh, NO_EDGES), target.samples, FitOptions(threads=n)) for n in (1, 2, 3)]
+    results = [fit_mesh(target.task(mesh, NO_EDGES), target.samples, threads=n) for n in (1, 2, 3)]
     for result in results[1:]:
         np.testing.assert_array_equal(result.points, results[0].points)
         np.testing.assert_array_equal(result.faces, results[0].faces)

@@ -1,8 +1,7 @@
 """Collapses of short edges within a tolerance; points only go to points that are there, and creases stay."""
 
-from typing import Any, NamedTuple
-
 from .compiled import kernel
+from .stars import keeps_topology
 from .triangulation import faces_around, join_across
 from .vectors import coordinates, cross, dot, length, square_to_triangle, squared_length, subtract, subtract_share
 
@@ -10,49 +9,6 @@ _MIN_NORMAL_COSINE = 0.97  # between the normals of a triangle before and after 
 _MIN_CREASE_COSINE = 0.7  # of the turn of a crease at a point that goes; sharper ones are corners
 _SLIVER_THICKNESS = 0.125  # area over squared longest side, below which a triangle is a sliver; heuristic
 _MIN_THICKNESS = 0.05  # area over squared longest side of a new triangle, unless there was a thinner one; heuristic
-
-
-class Stars(NamedTuple):
-    """Workspace for the faces around two points; points with more faces than it holds stay.
-
-    Attributes
-    ----------
-    faces, corners
-        The faces counter-clockwise around the point that goes, and its corner in each (n,).
-    other_faces, other_corners
-        The same for the point that it goes to (n,).
-    marks
-        The last collapse that looked at each point as a neighbour (V,).
-    """
-
-    faces: Any
-    corners: Any
-    other_faces: Any
-    other_corners: Any
-    marks: Any
-
-
-@kernel
-def _keeps_topology(mesh, stars, n, closed, other, last, stamp):
-    """Return whether the two points have no other common neighbours than the collapse joins (the link condition)."""
-    for k in range(n):
-        face, corner = stars.faces[k], stars.corners[k]
-        ring = mesh.faces[face, (corner + 1) % 3]
-        joined = k == 1 if not last else k == n - 1
-        joined = joined or (closed and k == n - 1)
-        if ring != other and not joined and stars.marks[ring] == stamp:
-            return False
-    far_end = mesh.faces[stars.faces[n - 1], (stars.corners[n - 1] + 2) % 3]
-    if not closed and not last and n > 1 and stars.marks[far_end] == stamp:
-        return False
-    if closed and n == 3:
-        face, corner = stars.faces[1], stars.corners[1]
-        across = mesh.neighbours[face, corner]
-        if across >= 0:
-            for i in range(3):
-                if mesh.faces[across, i] == other:
-                    return False
-    return n > 2 if closed else n > 1
 
 
 @kernel
@@ -137,7 +93,7 @@ def _deviation(mesh, stars, first, end, n, other):
 
 
 @kernel
-def _collapse(mesh, stars, face, corner, last, tolerance, stamp):
+def _collapse(mesh, stars, face, corner, last, tolerance):
     """Move a corner of a face to the next one, or to the one before if ``last``, and return whether that was done."""
     point = mesh.faces[face, corner]
     target = (corner + (2 if last else 1)) % 3
@@ -148,13 +104,8 @@ def _collapse(mesh, stars, face, corner, last, tolerance, stamp):
     end = _crease_end(mesh, stars, n, closed, last)
     if end == -2:
         return False
-    n_other, _ = faces_around(mesh, face, target, stars.other_faces, stars.other_corners)
-    if n_other < 0:
-        return False
-    for k in range(n_other):
-        for step in range(1, 3):
-            stars.marks[mesh.faces[stars.other_faces[k], (stars.other_corners[k] + step) % 3]] = stamp
-    if not _keeps_topology(mesh, stars, n, closed, other, last, stamp):
+    n_other, closed_other = faces_around(mesh, face, target, stars.other_faces, stars.other_corners)
+    if n_other < 0 or n == 1 or not keeps_topology(mesh, stars, n, closed, n_other, closed_other):
         return False
     first = 0 if last else 1
     limit = n - 1 if last or closed else n
@@ -177,7 +128,7 @@ def _collapse(mesh, stars, face, corner, last, tolerance, stamp):
 
 
 @kernel
-def collapse_short_edges(mesh, stars, first_movable, max_square, sliver_square, tolerance, stamp):
+def collapse_short_edges(mesh, stars, first_movable, max_square, sliver_square, tolerance):
     """Collapse edges of no larger square once over all faces, as far as the surface moves within the tolerance.
 
     Faces that go have -1 as their first corner.
@@ -187,20 +138,18 @@ def collapse_short_edges(mesh, stars, first_movable, max_square, sliver_square, 
     mesh
         The triangulation; its deviations grow with every collapse.
     stars
-        Workspace; marks are at most ``stamp``.
+        Workspace.
     first_movable
         Points before this one stay.
     max_square, sliver_square
         Largest squared length, and the same for the edges of slivers.
     tolerance
         Largest deviation.
-    stamp
-        Number of tries before.
 
     Returns
     -------
-    tuple
-        Numbers of collapses, and of tries in all.
+    int
+        Number of collapses.
     """
     count = 0
     for face in range(len(mesh.faces)):
@@ -220,11 +169,9 @@ def collapse_short_edges(mesh, stars, first_movable, max_square, sliver_square, 
             limit = sliver_square if is_sliver else max_square
             done = False
             if squared_length(to_after) <= limit:
-                stamp += 1
-                done = _collapse(mesh, stars, face, corner, False, tolerance, stamp)
+                done = _collapse(mesh, stars, face, corner, False, tolerance)
             if not done and mesh.neighbours[face, after] < 0 and squared_length(to_before) <= limit:
-                stamp += 1
-                done = _collapse(mesh, stars, face, corner, True, tolerance, stamp)
+                done = _collapse(mesh, stars, face, corner, True, tolerance)
             count += done
             corner = 0 if done else corner + 1
-    return count, stamp
+    return count

@@ -3,14 +3,16 @@
 from typing import Any, NamedTuple
 
 from .compiled import kernel
+from .heap import pop, push
 from .quadrics import add_plane, quadric_step, quadric_trace, quadric_value
+from .stars import keeps_topology
 from .triangulation import corner_of, faces_around, join_across
 from .vectors import coordinates, cross, dot, length, squared_length, subtract, subtract_share
 
 _PULL = 1e-6  # towards the middle of an edge, where the planes leave the place open
 _MAX_STEP = 1.0  # edge lengths from the middle of an edge to the place of its point
 _LENGTH_WEIGHT = 1e-9  # of squared lengths beside squared distances: orders the collapses in planes; heuristic
-_BOUNDARY_WEIGHT = 3.0  # of a boundary edge, in squared lengths; heuristic
+_WALL_WEIGHT = 3.0  # of an edge of the boundary or a crease, in squared lengths; heuristic
 _MIN_COSINE = 0.2  # between the normals of a triangle before and after a collapse; heuristic
 _MIN_THICKNESS = 1e-4  # area over squared longest side of a new triangle, unless there was a thinner one; heuristic
 
@@ -21,77 +23,39 @@ class Decimation(NamedTuple):
     Attributes
     ----------
     mesh
-        The mesh. Faces that are gone have -1 as their first corner.
+        The mesh; sides of another label than 0 form creases. Faces that are gone have -1 as their first corner.
     quadrics
         A quadric for each point (V, 10), the last row for workspace (V + 1, 10).
     held
         1 for points that stay (V,).
-    at_boundary
-        1 for points of the boundary (V,).
+    on_line
+        1 for points of the boundary and of creases (V,), which only go along these.
     face_at
         One of the faces at each point (V,).
     changed
         The number of collapses after which each point was changed last (V,); -1 if it is gone.
-    costs, ends, made
-        Heap of edges, the cheapest first: cost, two ends (n, 2), and the number of collapses when it was entered (n,).
+    heap
+        Heap of edges, made at the number of collapses before.
     stars
-        Workspace (4, n) for the faces around two points, and their corners.
-    marks
-        0 for each point (V,) between uses.
+        Workspace.
     """
 
     mesh: Any
     quadrics: Any
     held: Any
-    at_boundary: Any
+    on_line: Any
     face_at: Any
     changed: Any
-    costs: Any
-    ends: Any
-    made: Any
+    heap: Any
     stars: Any
-    marks: Any
-
-
-@kernel
-def _swap(state, i, j):
-    """Exchange two entries of the heap."""
-    costs, ends, made = state.costs, state.ends, state.made
-    costs[i], costs[j] = costs[j], costs[i]
-    made[i], made[j] = made[j], made[i]
-    for end in range(2):
-        ends[i, end], ends[j, end] = ends[j, end], ends[i, end]
 
 
 @kernel
 def _push(state, size, p, q, now):
-    """Enter the edge p q into a heap of this size, if there is room, and return the size."""
-    if size == len(state.costs) or (state.held[p] and state.held[q]):
+    """Enter the edge p q into the heap, and return the new size."""
+    if state.held[p] and state.held[q]:
         return size
-    state.costs[size] = _place(state, p, q)[0]
-    state.ends[size, 0], state.ends[size, 1], state.made[size] = p, q, now
-    k = size
-    while k > 0 and state.costs[k] < state.costs[(k - 1) // 2]:
-        _swap(state, k, (k - 1) // 2)
-        k = (k - 1) // 2
-    return size + 1
-
-
-@kernel
-def _pop(state, size):
-    """Move the cheapest entry of a heap of this size behind its new end, which is returned."""
-    last = size - 1
-    _swap(state, 0, last)
-    k = 0
-    while 2 * k + 1 < last:
-        child = 2 * k + 1
-        if child + 1 < last and state.costs[child + 1] < state.costs[child]:
-            child += 1
-        if not state.costs[child] < state.costs[k]:
-            break
-        _swap(state, k, child)
-        k = child
-    return last
+    return push(state.heap, size, _place(state, p, q)[0], p, q, now)
 
 
 @kernel
@@ -134,32 +98,6 @@ def _thickness(a, b, c):
 
 
 @kernel
-def _mark_ring(state, faces, corners, n, value):
-    """Mark the points of the faces around a point, but not the point itself."""
-    for k in range(n):
-        for turn in range(1, 3):
-            state.marks[state.mesh.faces[faces[k], (corners[k] + turn) % 3]] = value
-
-
-@kernel
-def _keeps_topology(state, gone, n_gone, closed, n_into):
-    """Return whether the two points have no common neighbours but the ones across their edge (the link condition)."""
-    mesh, (faces, corners, other_faces, other_corners) = state.mesh, state.stars
-    _mark_ring(state, other_faces, other_corners, n_into, 1)
-    joined, common = 0, 0
-    for k in range(n_gone):
-        common += state.marks[mesh.faces[faces[k], (corners[k] + 1) % 3]]
-    if not closed:
-        common += state.marks[mesh.faces[faces[n_gone - 1], (corners[n_gone - 1] + 2) % 3]]
-    _mark_ring(state, other_faces, other_corners, n_into, 0)
-    for k in range(n_into):
-        for turn in range(1, 3):
-            joined += mesh.faces[other_faces[k], (other_corners[k] + turn) % 3] == gone
-    left = n_gone + n_into - 2 * joined
-    return common == joined and left >= (3 if closed and joined == 2 else 1)
-
-
-@kernel
 def _keeps_shapes(state, faces, corners, n, other, place):
     """Return whether no triangle around a point, without the other one, turns or gets thin if it goes to a place."""
     mesh = state.mesh
@@ -179,50 +117,78 @@ def _keeps_shapes(state, faces, corners, n, other, place):
 
 
 @kernel
+def _joined_by_line(state, n, into):
+    """Return whether the side between two points is one of the boundary or of a crease; the faces are in the stars."""
+    mesh, stars = state.mesh, state.stars
+    for k in range(n):
+        face = stars.faces[k]
+        for turn in range(1, 3):
+            side = (stars.corners[k] + 3 - turn) % 3
+            on_line = mesh.labels[face, side] != 0 or mesh.neighbours[face, side] < 0
+            if on_line and mesh.faces[face, (stars.corners[k] + turn) % 3] == into:
+                return True
+    return False
+
+
+@kernel
+def _keeps_lines(state, n, into):
+    """Return whether no two creases become one: none of the faces that go has creases on both its other sides."""
+    mesh, stars = state.mesh, state.stars
+    for k in range(n):
+        face, corner = stars.faces[k], stars.corners[k]
+        for turn in range(1, 3):
+            other = (corner + turn) % 3
+            if mesh.faces[face, other] == into and mesh.labels[face, corner] != 0 and mesh.labels[face, other] != 0:
+                return False
+    return True
+
+
+@kernel
+def _may_collapse(state, gone, n, closed, into):
+    """Return the number of faces around the point that another one may go to, or -1; its own are in the stars."""
+    mesh, stars = state.mesh, state.stars
+    face = state.face_at[into]
+    n_into, closed_into = faces_around(mesh, face, corner_of(mesh, face, into), stars.other_faces, stars.other_corners)
+    if n < 0 or n_into < 0 or not keeps_topology(mesh, stars, n, closed, n_into, closed_into):
+        return -1
+    if state.on_line[gone] and not _joined_by_line(state, n, into):
+        return -1
+    return n_into if _keeps_lines(state, n, into) else -1
+
+
+@kernel
 def _collapse(state, p, q):
     """Collapse the edge p q if that is allowed, and return the point that is left, or -1."""
-    mesh, (faces, corners, other_faces, other_corners) = state.mesh, state.stars
-    gone, into = (q, p) if state.held[p] or (state.at_boundary[p] and not state.at_boundary[q]) else (p, q)
+    mesh, stars = state.mesh, state.stars
+    gone, into = (q, p) if state.held[p] or (state.on_line[p] and not state.on_line[q]) else (p, q)
     if state.held[gone]:
         return -1
     face = state.face_at[gone]
-    n_gone, closed = faces_around(mesh, face, corner_of(mesh, face, gone), faces, corners)
-    face = state.face_at[into]
-    n_into, _ = faces_around(mesh, face, corner_of(mesh, face, into), other_faces, other_corners)
-    if n_gone < 0 or n_into < 0 or not _keeps_topology(state, gone, n_gone, closed, n_into):
-        return -1
-    if not closed and not _joined_by_boundary(state, gone, n_gone, into):
+    n_gone, closed = faces_around(mesh, face, corner_of(mesh, face, gone), stars.faces, stars.corners)
+    n_into = _may_collapse(state, gone, n_gone, closed, into)
+    if n_into < 0:
         return -1
     place = _place(state, p, q)[1]
-    if not _keeps_shapes(state, faces, corners, n_gone, into, place):
+    if not _keeps_shapes(state, stars.faces, stars.corners, n_gone, into, place):
         return -1
-    if not _keeps_shapes(state, other_faces, other_corners, n_into, gone, place):
+    if not _keeps_shapes(state, stars.other_faces, stars.other_corners, n_into, gone, place):
         return -1
     for k in range(n_gone):
-        face = faces[k]
-        if mesh.faces[face, (corners[k] + 1) % 3] == into or mesh.faces[face, (corners[k] + 2) % 3] == into:
+        face, corner = stars.faces[k], stars.corners[k]
+        if mesh.faces[face, (corner + 1) % 3] == into or mesh.faces[face, (corner + 2) % 3] == into:
             join_across(mesh, face, gone, into)
     for k in range(n_gone):
-        if mesh.faces[faces[k], 0] >= 0:
-            mesh.faces[faces[k], corners[k]] = into
-            _note_face(state, faces[k])
+        if mesh.faces[stars.faces[k], 0] >= 0:
+            mesh.faces[stars.faces[k], stars.corners[k]] = into
+            _note_face(state, stars.faces[k])
     for k in range(n_into):
-        if mesh.faces[other_faces[k], 0] >= 0:
-            _note_face(state, other_faces[k])
+        if mesh.faces[stars.other_faces[k], 0] >= 0:
+            _note_face(state, stars.other_faces[k])
     for k in range(10):
         state.quadrics[into, k] += state.quadrics[gone, k]
     mesh.points[into, 0], mesh.points[into, 1], mesh.points[into, 2] = place
     state.changed[gone] = -1
     return into
-
-
-@kernel
-def _joined_by_boundary(state, gone, n_gone, into):
-    """Return whether a point of the boundary is the next one on it: its faces begin or end there."""
-    mesh, (faces, corners, _, _) = state.mesh, state.stars
-    first = mesh.faces[faces[0], (corners[0] + 1) % 3]
-    last = mesh.faces[faces[n_gone - 1], (corners[n_gone - 1] + 2) % 3]
-    return first == into or last == into
 
 
 @kernel
@@ -234,7 +200,7 @@ def _note_face(state, face):
 
 @kernel
 def set_quadrics(state):
-    """Set the quadric of each point: planes of its faces, weighted by area, and walls on its boundary edges."""
+    """Set the quadric of each point: planes of its faces, weighted by area, and walls on boundary and creases."""
     mesh, quadrics = state.mesh, state.quadrics
     for face in range(len(mesh.faces)):
         for corner in range(3):
@@ -248,12 +214,12 @@ def set_quadrics(state):
                 continue
             unit = normal[0] / size, normal[1] / size, normal[2] / size
             add_plane(quadrics[p], 0.5 * size, unit, apex)
-            if mesh.neighbours[face, corner] < 0:
+            if mesh.neighbours[face, corner] < 0 or mesh.labels[face, corner] != 0:
                 along = subtract(end, start)
                 across = cross(unit, along)
                 reach = length(across)
                 wall = across[0] / reach, across[1] / reach, across[2] / reach
-                weight = _BOUNDARY_WEIGHT * squared_length(along)
+                weight = _WALL_WEIGHT * squared_length(along)
                 add_plane(quadrics[q], weight, wall, start)
                 add_plane(quadrics[r], weight, wall, start)
 
@@ -272,7 +238,7 @@ def _push_all(state, now):
 @kernel
 def _push_around(state, size, point, now):
     """Enter the edges at a point into a heap of this size, and return the size."""
-    mesh, (faces, corners, _, _) = state.mesh, state.stars
+    mesh, faces, corners = state.mesh, state.stars.faces, state.stars.corners
     face = state.face_at[point]
     n, closed = faces_around(mesh, face, corner_of(mesh, face, point), faces, corners)
     for k in range(n):
@@ -292,8 +258,8 @@ def decimate(state, wanted):
     while progress and count < wanted:
         progress, size = False, _push_all(state, count)
         while size > 0 and count < wanted:
-            size = _pop(state, size)
-            p, q, made = state.ends[size, 0], state.ends[size, 1], state.made[size]
+            size = pop(state.heap, size)
+            p, q, made = state.heap.ends[size, 0], state.heap.ends[size, 1], state.heap.made[size]
             if min(state.changed[p], state.changed[q]) < 0 or made < max(state.changed[p], state.changed[q]):
                 continue
             point = _collapse(state, p, q)

@@ -15,28 +15,18 @@ from .fit_patch import (
 )
 from .fit_splits import MAX_STEP, MIN_COSINE, MIN_QUALITY, REFUSED
 from .quadrics import quadric_value
+from .stars import keeps_topology
 from .triangulation import faces_around, join_across
 from .vectors import coordinates, length, subtract, subtract_share
 
 
 @kernel
-def _may_collapse(fit, n_gone, n_into):
-    """Return whether an edge may be collapsed: the two points have no common neighbours but the two across it."""
-    mesh, patch, marks = fit.mesh, fit.patch, fit.patch.marks
-    for k in range(n_into):
-        face, corner = patch.other_faces[k], patch.other_corners[k]
-        marks[mesh.faces[face, (corner + 1) % 3]] = 1
-        marks[mesh.faces[face, (corner + 2) % 3]] = 1
-    common, labels = 0, 0
-    for k in range(n_gone):
-        face, corner = patch.faces[k], patch.corners[k]
-        common += marks[mesh.faces[face, (corner + 1) % 3]]
-        labels += mesh.labels[face, (corner + 1) % 3] != 0
-    for k in range(n_into):
-        face, corner = patch.other_faces[k], patch.other_corners[k]
-        marks[mesh.faces[face, (corner + 1) % 3]] = 0
-        marks[mesh.faces[face, (corner + 2) % 3]] = 0
-    return common == 2 and labels == 0
+def _count_marked_sides(mesh, stars, n):
+    """Return how many of the n sides that end at the point that goes have a label."""
+    count = 0
+    for k in range(n):
+        count += mesh.labels[stars.faces[k], (stars.corners[k] + 1) % 3] != 0
+    return count
 
 
 @kernel
@@ -54,10 +44,10 @@ def _collapse_patch(fit, f, i):
     if fit.freedom[gone] == 0:
         return 0, 0, gone, into
     n_gone, closed = faces_around(mesh, f, at_gone, patch.faces, patch.corners)
-    n_into, _ = faces_around(mesh, f, at_into, patch.other_faces, patch.other_corners)
-    if not closed or n_into < 0 or n_gone < 3 or n_gone + n_into > len(patch.faces) or n_gone + n_into < 7:
+    n_into, closed_into = faces_around(mesh, f, at_into, patch.other_faces, patch.other_corners)
+    if not closed or n_into < 0 or n_gone < 3 or n_gone + n_into > len(patch.faces):
         return 0, 0, gone, into
-    if not _may_collapse(fit, n_gone, n_into):
+    if _count_marked_sides(mesh, patch, n_gone) or not keeps_topology(mesh, patch, n_gone, closed, n_into, closed_into):
         return 0, 0, gone, into
     n, g = 0, mesh.neighbours[f, i]
     for k in range(n_gone):

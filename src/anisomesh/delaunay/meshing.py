@@ -20,7 +20,7 @@ from anisomesh.mesh.closest_points import ClosestPoints
 from anisomesh.mesh.surface import Surface
 from anisomesh.mesh.topology import edge_keys, half_edges
 from anisomesh.mesh.validity import faulty_faces
-from anisomesh.meshops.collapse import decimate, fixed_by
+from anisomesh.meshops.decimation import decimate, ends_of_creases
 from anisomesh.meshops.edge_recovery import recover_edges
 from anisomesh.meshops.flip import flip_for_shape
 from anisomesh.meshops.inverted import remove_inverted_triangles
@@ -270,12 +270,16 @@ def _coarsened(task: MeshingTask, mesh: FeatureMesh) -> FeatureMesh:
     """Return the mesh with no more vertices than asked for, if collapses can do that: step 4."""
     if len(mesh.points) <= task.n_vertices:
         return mesh
-    points, faces, links = mesh.points, mesh.faces, mesh.crease_edges
-    if np.count_nonzero(mesh.locked | fixed_by(links, len(points))) <= MAX_FIXED_SHARE * task.n_vertices:
-        points, faces, links = decimate(points, faces, task.n_vertices, task.reference, kept=mesh.locked, creases=links)
-    if len(points) > task.n_vertices:  # fewer than the creases need
-        points, faces, links = decimate(points, faces, task.n_vertices, task.reference)
-    return _without_inverted(task, FeatureMesh(points, faces, links, np.zeros(len(points), dtype=bool)))
+    n, reference = task.n_vertices, task.reference
+    surface, creases = Surface(mesh.points, mesh.faces), mesh.crease_edges
+    if np.count_nonzero(mesh.locked | ends_of_creases(creases, surface.n_points)) <= MAX_FIXED_SHARE * n:
+        coarser = decimate(surface, n, held=mesh.locked, crease_edges=creases, reference=reference)
+        surface, creases = coarser.surface, coarser.crease_edges
+    if surface.n_points > n:  # fewer than the creases need
+        coarser = decimate(surface, n, reference=reference)
+        surface, creases = coarser.surface, coarser.crease_edges
+    none = np.zeros(surface.n_points, dtype=bool)
+    return _without_inverted(task, FeatureMesh(surface.points, surface.faces, creases, none))
 
 
 def _without_crossings(
@@ -290,13 +294,13 @@ def _without_crossings(
     for _ in range(_MAX_TRIMS):
         if len(points) <= n_wanted:
             break
-        kept = np.arange(len(points)) >= n_wanted
-        points_left, faces_left, links_left = decimate(points, faces, n_wanted, reference, kept=kept, creases=links)
+        added = np.arange(len(points)) >= n_wanted
+        trimmed = decimate(Surface(points, faces), n_wanted, held=added, crease_edges=links, reference=reference)
         coarser = remove_self_intersections(
-            points_left, faces_left, reference, max_tries=_TRIM_TRIES, deadline=task.deadline
+            trimmed.surface.points, trimmed.surface.faces, reference, max_tries=_TRIM_TRIES, deadline=task.deadline
         )
         if coarser[2] > crossing:
             break
         points, faces, crossing = coarser
-        links = links_left
+        links = trimmed.crease_edges
     return points, faces

@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 from anisomesh.deadline import NO_DEADLINE, Deadline
+from anisomesh.fitting.arrays import FitTask
 from anisomesh.fitting.samples import SurfaceSamples
-from anisomesh.fitting.state import FitState, FitTask
+from anisomesh.fitting.state import FitState
 from anisomesh.mesh.surface import Surface
 
 _FIRST_SWEEPS, _ROUND_SWEEPS, _LAST_SWEEPS = 4, 2, 8  # at most
@@ -33,12 +34,6 @@ class FitOptions:
     min_quality
         Mean quality up to which the price rises: to 30 times what it is at most, and as long as the root mean squared
         error is not 1.5 times the one at the start. 0 for a price that stays.
-    decimation
-        How a decimation of the surface is fitted in place of a mesh; None to fit the mesh.
-    crease_angle
-        Degrees from which on an edge is a crease, along which points only slide; 180 for none.
-    threads
-        Number of threads; the result does not depend on it.
     """
 
     price: float = 8.0
@@ -46,13 +41,34 @@ class FitOptions:
     rounds: int = 4
     share: float = 0.05
     min_quality: float = 0.0
+
+
+@dataclass(frozen=True, kw_only=True)
+class FitPlan:
+    """What is fitted, and how.
+
+    Attributes
+    ----------
+    mesh
+        How a mesh is fitted.
+    decimation
+        How a decimation of the surface is fitted in place of the mesh, None if it is not.
+    threads
+        Number of threads; the result does not depend on it.
+    """
+
+    mesh: FitOptions = field(default_factory=FitOptions)
     decimation: FitOptions | None = None
-    crease_angle: float = 40.0
     threads: int = 1
 
 
 def fit_mesh(
-    task: FitTask, samples: SurfaceSamples, options: FitOptions | None = None, *, deadline: Deadline = NO_DEADLINE
+    task: FitTask,
+    samples: SurfaceSamples,
+    options: FitOptions | None = None,
+    *,
+    threads: int = 1,
+    deadline: Deadline = NO_DEADLINE,
 ) -> Surface:
     """Return a mesh with as many points, changed such that it is nearer to a surface and its triangles better shaped.
 
@@ -64,6 +80,8 @@ def fit_mesh(
         Samples of the surface, at bounding-box diagonal 1.
     options
         How it is fitted.
+    threads
+        Number of threads; the result does not depend on it.
     deadline
         Asked before every sweep and round.
 
@@ -90,7 +108,7 @@ def fit_mesh(
     """
     options = FitOptions() if options is None else options
     count = int(options.share * task.mesh.n_points) + 1 if options.rounds else 0
-    state = FitState(task, samples, n_spare=count, threads=options.threads)
+    state = FitState(task, samples, n_spare=count, threads=threads)
     largest = _MAX_ERROR_FACTOR**2 * state.mean_square
     for factor in _RISE:
         saved = state.saved() if factor > 1.0 else None

@@ -10,9 +10,9 @@ from scipy.spatial import cKDTree
 
 from anisomesh._arrays import PointMask, Points
 from anisomesh.features.detect import sharp_edges
-from anisomesh.fitting.fit import FitOptions
+from anisomesh.fitting.arrays import FitTask
+from anisomesh.fitting.fit import FitPlan
 from anisomesh.fitting.samples import SurfaceSamples, sample_surface
-from anisomesh.fitting.state import FitTask
 from anisomesh.mesh.closest_points import ClosestPoints
 from anisomesh.mesh.surface import Surface
 from anisomesh.mesh.topology import edge_keys
@@ -38,7 +38,9 @@ class FitTarget:
         Corners of its creases, and apexes (n, 3): points of a mesh that are at one stay there.
     holds_creases
         Whether points on creases stay, since they were prescribed and the shape may not tell where they are.
-    options
+    crease_angle
+        Edges that bend by more degrees are creases, along which points only slide; 180 for none.
+    plan
         How meshes are fitted.
     """
 
@@ -46,7 +48,8 @@ class FitTarget:
     samples: SurfaceSamples
     corners: Points
     holds_creases: bool = False
-    options: FitOptions = field(default_factory=FitOptions)
+    crease_angle: float = 40.0
+    plan: FitPlan = field(default_factory=FitPlan)
 
     @classmethod
     def of(
@@ -57,7 +60,8 @@ class FitTarget:
         *,
         corners: Points,
         holds_creases: bool = False,
-        options: FitOptions | None = None,
+        crease_angle: float = 40.0,
+        plan: FitPlan | None = None,
     ) -> FitTarget:
         """Return the target for meshes of a number of vertices.
 
@@ -69,18 +73,24 @@ class FitTarget:
             The metric, which may be on a surface that differs by a tolerance.
         n_vertices
             Vertices of the meshes.
-        corners, holds_creases, options
+        corners, holds_creases, crease_angle, plan
             See the attributes.
         """
-        options = FitOptions() if options is None else options
         samples = sample_surface(
             reference.surface,
             max(_SAMPLES_PER_VERTEX * n_vertices, _MIN_SAMPLES),
-            creases=sharp_edges(reference.surface, options.crease_angle),
+            creases=sharp_edges(reference.surface, crease_angle),
             metric=metric,
             rng=np.random.default_rng(0),
         )
-        return cls(reference=reference, samples=samples, corners=corners, holds_creases=holds_creases, options=options)
+        return cls(
+            reference=reference,
+            samples=samples,
+            corners=corners,
+            holds_creases=holds_creases,
+            crease_angle=crease_angle,
+            plan=FitPlan() if plan is None else plan,
+        )
 
     def at_corners(self, points: Points) -> PointMask:
         """Return which points (n,) are at a corner."""
@@ -96,4 +106,4 @@ class FitTarget:
         kept = np.zeros(len(mesh.edges), dtype=bool)
         if self.holds_creases:
             kept = np.isin(edge_keys(mesh.edges), edge_keys(crease_edges))
-        return FitTask(mesh=mesh, held=held, kept=kept, crease_angle=self.options.crease_angle)
+        return FitTask(mesh=mesh, held=held, kept=kept, crease_angle=self.crease_angle)

@@ -9,13 +9,13 @@ from scipy.spatial import cKDTree
 
 from anisomesh._arrays import FaceLabels, PointMask
 from anisomesh.deadline import NO_DEADLINE, Deadline
-from anisomesh.fitting.decimation import decimated
+from anisomesh.fitting.arrays import FitTask
 from anisomesh.fitting.fit import FitOptions, fit_mesh
-from anisomesh.fitting.state import FitTask
 from anisomesh.fitting.target import EdgeEnds, FitTarget
 from anisomesh.mesh.closest_points import ClosestPoints
 from anisomesh.mesh.surface import Surface
 from anisomesh.mesh.validity import faulty_faces
+from anisomesh.meshops.decimation import decimate
 from anisomesh.meshops.inverted import remove_inverted_triangles
 from anisomesh.meshops.self_intersections import remove_self_intersections
 
@@ -46,18 +46,18 @@ def fit_without_faults(
     the mesh there and the edges between them are held, and the mesh is fitted again: once with exchange of points, then
     twice without. If faults are left, the mesh itself is returned.
 
-    If the options say so, a decimation of the surface is fitted in the same way, and the mesh only if faults are left
+    If the plan says so, a decimation of the surface is fitted in the same way, and the mesh only if faults are left
     on that. On machine parts it ends nearer, because the triangles of least error are longer on developable parts than
     an embedding reproduces.
     """
     max_faults = len(faulty_faces(mesh, target.reference))
-    fitted = None
-    if target.options.decimation is not None and not target.holds_creases:
+    plan, fitted = target.plan, None
+    if plan.decimation is not None and not target.holds_creases:
         start = _decimated(target, mesh.n_points)
         if start is not None:
-            fitted = _fitted(start, target, target.options.decimation, max_faults, deadline)
+            fitted = _fitted(start, target, plan.decimation, max_faults, deadline)
     if fitted is None:
-        fitted = _fitted(target.task(mesh, crease_edges), target, target.options, max_faults, deadline)
+        fitted = _fitted(target.task(mesh, crease_edges), target, plan.mesh, max_faults, deadline)
     return mesh if fitted is None else fitted
 
 
@@ -67,8 +67,8 @@ def _decimated(target: FitTarget, n_points: int) -> FitTask | None:
     held = target.at_corners(surface.points)
     if np.count_nonzero(held) > _MAX_HELD * n_points:
         held[:] = False
-    start = decimated(surface, n_points, held)
-    return None if start is None else target.task(start, _NO_EDGES)
+    start = decimate(surface, n_points, held=held).surface
+    return target.task(start, _NO_EDGES) if start.n_points == n_points else None
 
 
 def _fitted(
@@ -77,7 +77,7 @@ def _fitted(
     """Return the mesh of a task fitted with no more than this many faults, None if that does not succeed."""
     mesh, without_exchange = task.mesh, replace(options, rounds=0)
     for how in (options, options, without_exchange, without_exchange):
-        fitted = fit_mesh(task, target.samples, how, deadline=deadline)
+        fitted = fit_mesh(task, target.samples, how, threads=target.plan.threads, deadline=deadline)
         faulty = faulty_faces(fitted, target.reference)
         if max_faults < len(faulty) <= _MAX_REPAIRS and not task.kept.any():
             fitted = _repaired(fitted, target.reference, deadline)

@@ -8,6 +8,7 @@ import numpy as np
 
 from anisomesh._arrays import PointLabels
 from anisomesh._kernels import collapse as kernels
+from anisomesh._kernels.stars import Stars
 from anisomesh.mesh.marked_surface import MarkedSurface
 from anisomesh.mesh.surface import Surface
 
@@ -77,12 +78,12 @@ def collapse_short_edges(start: MarkedSurface, *, max_length: float, tolerance: 
         return unchanged
     mesh = start.triangulation(surface.n_faces)
     faces, corners, other_faces, other_corners = np.zeros((4, _ROOM), dtype=np.int32)
-    stars = kernels.Stars(faces, corners, other_faces, other_corners, np.zeros(surface.n_points, dtype=np.int64))
-    total = tries = 0
+    stars = Stars(faces, corners, other_faces, other_corners, np.zeros(surface.n_points, dtype=np.uint8))
+    total = 0
     for share in _SHARES:
         for _ in range(_PASSES):
             squares = (share * max_length) ** 2, (share * _SLIVER_FACTOR * max_length) ** 2
-            count, tries = kernels.collapse_short_edges(mesh, stars, n_kept, *squares, tolerance, tries)
+            count = kernels.collapse_short_edges(mesh, stars, n_kept, *squares, tolerance)
             total += count
             if count == 0:
                 break

@@ -22,7 +22,7 @@ from anisomesh.mesh.closest_points import ClosestPoints
 from anisomesh.mesh.geometry import thickness, unit_frame
 from anisomesh.mesh.surface import Surface
 from anisomesh.mesh.working_surface import working_surface
-from anisomesh.meshops.collapse import decimate
+from anisomesh.meshops.decimation import decimate
 from anisomesh.metric.curvature import PrincipalCurvatures, principal_curvatures
 from anisomesh.metric.tensors import curvature_metric, metric_root
 from anisomesh.metric.transfer import transfer_metric_roots
@@ -160,8 +160,7 @@ def _random_variants(
     for kind in recipe.variants:
         if kind == "decimated":
             n = round(rng.uniform(*_DECIMATED_RANGE) * clean.n_points)
-            points, faces, _ = decimate(clean.points, clean.faces, n, ClosestPoints(clean))
-            variants[kind] = Surface(points, faces)
+            variants[kind] = decimate(clean, n).surface
         elif kind == "stretched":
             n = round(rng.uniform(*_STRETCHED_RANGE) * clean.n_points)
             variants[kind] = with_random_triangles(clean, n, rng, remesher)
