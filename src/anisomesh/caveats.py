@@ -18,6 +18,7 @@ from anisomesh.resolve import embedding_name, is_designed
 
 _AT_CORNER = 1e-3  # of the diagonal, within which a vertex is at a corner
 _VOLUME_TOLERANCE = 0.05  # share by which the enclosed volume may change without a remark
+_FEATURE_TOLERANCE = 0.25  # mean edge lengths from prescribed edges to edges of the result without a remark
 COUNT_TOLERANCE = 0.02  # share of the vertices asked for by which a result may differ without a remark
 
 
@@ -30,7 +31,9 @@ def losses_of_repair(report: PrepareReport) -> Iterator[str]:
         yield f"the surface has one side only, and was cut open along {report.edges_nonorientable_cut:,} edges"
 
 
-def losses_of_shape(surface: Surface, mesh: Surface, corner_places: Points) -> Iterator[str]:
+def losses_of_shape(
+    surface: Surface, mesh: Surface, corner_places: Points, feature_distance: float = 0.0
+) -> Iterator[str]:
     """Yield one sentence for everything that a mesh has lost of the shape of a surface.
 
     Parameters
@@ -39,7 +42,11 @@ def losses_of_shape(surface: Surface, mesh: Surface, corner_places: Points) -> I
         The surface and the mesh, in the same units.
     corner_places
         Where a designed surface has corners of creases and apexes (n, 3).
+    feature_distance
+        Largest distance from prescribed edges to edges of the mesh that follow them.
     """
+    if feature_distance > _FEATURE_TOLERANCE * mesh.edge_lengths.mean():
+        yield "prescribed edges are not all edges of the result; ask for more vertices"
     if len(corner_places) and is_designed(surface):
         distance = cKDTree(mesh.points).query(corner_places)[0]
         lost = np.count_nonzero(distance > _AT_CORNER * surface.diagonal)

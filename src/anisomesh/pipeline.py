@@ -20,6 +20,7 @@ from anisomesh.embedding.embedder import checked_embedding
 from anisomesh.errors import OptionError
 from anisomesh.features.detect import WEAK_ANGLE, apexes, sharp_edges
 from anisomesh.features.network import FeatureNetwork, trace_features
+from anisomesh.features.tagged import distance_to_crease_edges
 from anisomesh.fitting.fit import FitPlan
 from anisomesh.fitting.target import FitTarget
 from anisomesh.fitting.valid import fit_without_faults
@@ -189,9 +190,10 @@ def _remesh(source: PreparedInput, n: int, options: RemeshOptions, run: Run, *, 
         seconds=run.total_seconds(),
         warnings=(
             *losses_of_repair(prepared.report),
-            *losses_of_shape(surface, Surface(mesh.points, mesh.faces), task.corner_places),
+            *losses_of_shape(surface, Surface(mesh.points, mesh.faces), task.corner_places, made.feature_distance),
             *caveats(n, field.noise, mesh, validity, optimised, options),
         ),
+        feature_distance=made.feature_distance * frame.scale,
     )
 
 
@@ -212,11 +214,12 @@ def _fit_target(
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class _Made:
-    """A mesh, the sites it was made from, and the seed of their start."""
+    """A mesh, its distance from prescribed edges, the sites it was made from, and the seed of their start."""
 
     mesh: ValidMesh
     optimised: Optimised
     validity: Validity
+    feature_distance: float
     seed: int
 
     @property
@@ -255,11 +258,16 @@ def _mesh_of_start(task: MeshingTask, target: FitTarget | None, options: RemeshO
         mesh = mesh_from_sites(task, optimised.sites)
     with run.stage("fit"):
         surface = Surface(mesh.points, mesh.faces)
+        feature_distance = distance_to_crease_edges(
+            task.voronoi.embedded.surface, task.features.required, surface, mesh.crease_edges
+        )
         if target is not None:
             surface = fit_without_faults(surface, target, crease_edges=mesh.crease_edges, deadline=run.deadline)
             mesh = replace(mesh, points=surface.points, faces=surface.faces)
         validity = check_validity(surface, task.surface)
-    return _Made(mesh=mesh, optimised=optimised, validity=validity, seed=options.seed)
+    return _Made(
+        mesh=mesh, optimised=optimised, validity=validity, feature_distance=feature_distance, seed=options.seed
+    )
 
 
 def _features(

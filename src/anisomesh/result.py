@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import os
 from dataclasses import dataclass
+from math import isfinite
 from typing import Any
 
 from anisomesh._arrays import CornerTensors, PointTensors, Sites
@@ -60,6 +61,9 @@ class RemeshResult:
         Checks of the result against the prepared input.
     distance
         Largest distance between result and input, both ways, in model units; None unless ``max_error`` was given.
+    feature_distance
+        Largest distance from the edges in ``features`` to edges of the result that follow them, in model units; 0
+        without such edges, infinite if they are lost.
     seconds
         Wall-clock seconds per stage.
     warnings
@@ -88,6 +92,7 @@ class RemeshResult:
     seconds: dict[str, float]
     warnings: tuple[str, ...]
     distance: float | None = None
+    feature_distance: float = 0.0
 
     @property
     def diagram(self) -> Diagram:
@@ -113,6 +118,7 @@ class RemeshResult:
             "faces": self.surface.n_faces,
             "seconds": dict(self.seconds),
             "distance": self.distance,
+            "feature_distance": self.feature_distance if isfinite(self.feature_distance) else None,
             "embedding": self.embedding_name,
             "noise": self.noise,
             "energy": self.energy,

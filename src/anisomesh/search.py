@@ -36,6 +36,8 @@ def smallest_within(
 ) -> RemeshResult:
     """Return the smallest remesh found with a distance to the surface, both ways, of at most ``max_error``.
 
+    The distance from prescribed edges to edges that follow them counts as well.
+
     Parameters
     ----------
     remesh
@@ -59,6 +61,7 @@ def smallest_within(
     def error_at(n: int) -> float:
         result = remesh(n)
         error = hausdorff_distance(surface, result.surface, DISTANCE_SAMPLES)
+        error = min(max(error, result.feature_distance), surface.diagonal)
         if error <= max_error:
             results.clear()
             results[n] = replace(result, distance=error)  # only the last sufficient result is kept

@@ -1,6 +1,7 @@
 """Targets of a remesh: exact vertex count, maximum error, tagged edges, time limit."""
 
 import json
+from itertools import pairwise
 from types import SimpleNamespace
 
 import numpy as np
@@ -116,6 +117,25 @@ def test_a_line_on_a_plane_is_followed_exactly():
     along = np.linspace(-1.0, 1.0, 101)[:, None] * [1.0, 1.0, 0.0]
     assert distance_to_edges(along, new).max() < 1e-9
     assert new.n_points == 70
+
+
+def test_a_distance_is_not_reached_by_a_mesh_that_drops_the_named_edges():
+    """Regression: on a plane four vertices are within any distance, but follow no curve."""
+    surface = open_patch(lambda x, y: 0.0 * x, n=20)
+    wave = np.flatnonzero(
+        np.abs(surface.points[:, 1] - np.round(5.0 * np.sin(3.0 * surface.points[:, 0])) / 10.0) < 1e-9
+    )
+    wave = wave[np.argsort(surface.points[wave, 0])]
+    known = {tuple(sorted(edge)) for edge in surface.edges.tolist()}
+    pairs = np.array([pair for pair in pairwise(wave) if tuple(sorted(pair)) in known])
+    assert len(pairs) > 8
+    result = anisomesh.remesh(surface, max_error=0.05, features=pairs)
+    assert result.feature_distance <= 0.05
+    assert result.distance <= 0.05
+    assert distance_to_edges(surface.points[pairs].mean(axis=1), result.surface).max() < 0.05
+    few = anisomesh.remesh(surface, n_vertices=5, features=pairs)
+    assert few.feature_distance > 0.2
+    assert any("prescribed edges" in sentence for sentence in few.warnings)
 
 
 @pytest.mark.slow

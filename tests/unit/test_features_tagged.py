@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from anisomesh.errors import MeshFileError, OptionError
-from anisomesh.features.tagged import load_pairs, tagged_edges
+from anisomesh.features.tagged import distance_to_crease_edges, load_pairs, tagged_edges
 from anisomesh.mesh.surface import Surface
 from anisomesh.repair.prepare import prepare
 from anisomesh.shapes.analytic import open_patch
@@ -87,3 +87,15 @@ def test_other_files_are_refused_with_the_line(tmp_path, text):
         load_pairs(path)
     with pytest.raises(MeshFileError, match="cannot be read"):
         load_pairs(tmp_path / "none.txt")
+
+
+def test_distance_to_crease_edges_is_the_largest_one():
+    surface, coarse = grid(8), grid(4)
+    tagged = tagged_edges(surface, np.concatenate([row(surface), row(surface, 0.5)]), surface, 0.0)
+    none = np.zeros((0, 2), dtype=np.int64)
+    both = np.concatenate([row(coarse), row(coarse, 0.5)]).astype(np.int64)
+    assert distance_to_crease_edges(surface, tagged, coarse, both) < 1e-12
+    assert distance_to_crease_edges(surface, tagged, coarse, both[:4]) == pytest.approx(0.5)
+    assert distance_to_crease_edges(surface, tagged, coarse, both[1:]) == pytest.approx(0.5)
+    assert distance_to_crease_edges(surface, tagged, coarse, none) == np.inf
+    assert distance_to_crease_edges(surface, np.zeros_like(tagged), coarse, none) == 0.0

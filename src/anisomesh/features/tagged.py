@@ -6,6 +6,7 @@ import os
 from pathlib import Path
 from typing import Any
 
+import igl
 import numpy as np
 import numpy.typing as npt
 from scipy.spatial import cKDTree
@@ -105,3 +106,29 @@ def _checked_pairs(input_mesh: Surface, pairs: npt.ArrayLike) -> npt.NDArray[np.
             f"{missing.sum():,} of the {len(ends):,} pairs in features are not edges of the mesh, the first {a} - {b}"
         )
     return ends
+
+
+def distance_to_crease_edges(
+    surface: Surface, tagged: EdgeMask, mesh: Surface, crease_edges: npt.NDArray[np.int64]
+) -> float:
+    """Return the largest distance from tagged edges to edges of a mesh along creases; 0 if nothing is tagged.
+
+    Parameters
+    ----------
+    surface
+        The surface.
+    tagged
+        Its tagged edges (E,), of which the ends and middles are measured.
+    mesh
+        A mesh near the surface, in the same units.
+    crease_edges
+        Ends of the edges of the mesh along creases (n, 2); infinite if there are none.
+    """
+    if not tagged.any():
+        return 0.0
+    if len(crease_edges) == 0:
+        return float("inf")
+    ends = surface.points[surface.edges[tagged]]
+    places = np.concatenate([ends[:, 0], ends[:, 1], ends.mean(axis=1)])
+    squares, _, _ = igl.point_mesh_squared_distance(places, mesh.points, crease_edges)
+    return float(np.sqrt(squares.max()))
