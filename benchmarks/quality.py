@@ -14,8 +14,6 @@ import csv
 import json
 import os
 import sys
-from collections import defaultdict
-from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -26,11 +24,11 @@ import numpy.typing as npt
 import anisomesh
 from anisomesh import MetricField, RemeshResult, Surface
 from anisomesh.bench.methods import METHODS
-from anisomesh.caveats import COUNT_TOLERANCE
 from anisomesh.mesh.closest_points import ClosestPoints
 from anisomesh.mesh.distance import surface_distance
 from anisomesh.metric.quality import anisotropic_quality
 from anisomesh.metric.transfer import transfer_to_corners
+from quality_tables import EXACT, comparison, faults, key_of, tables
 
 OUT = Path(__file__).parent / "out" / "quality.jsonl"
 
@@ -38,9 +36,6 @@ OUT = Path(__file__).parent / "out" / "quality.jsonl"
 BAD, CAD, SMOOTH = "bad triangles", "CAD", "smooth"
 MIN_QUALITY = 0.7  # area-weighted mean quality of the triangles, below which a mesh is badly triangulated
 FLAT_HEIGHT = 1e-6  # of the diagonal: corners this near to the plane of the closest input facet lie in it
-
-
-EXACT = 1e-9  # of the diagonal: added to distances before they are compared
 
 
 @dataclass(frozen=True)
@@ -67,11 +62,6 @@ class Run:
     @property
     def key(self) -> tuple[str, float, float, str]:
         return self.case.name, self.ratio, self.sharpness, self.metric
-
-
-def key_of(row: dict[str, Any]) -> tuple[str, float, float, str]:
-    """Return the key of the run of a row."""
-    return row["mesh"], row["ratio"], row["sharpness"], row.get("metric", "curvature")
 
 
 def cases(data: Path, folders: list[str]) -> list[Case]:
@@ -141,128 +131,13 @@ def measure(run: Run) -> dict[str, Any]:
     }
 
 
-def faults(row: dict[str, Any]) -> list[str]:
-    """Return the faults of a result in words."""
-    validity = row["validity"]
-    found = [] if validity["oriented"] else ["not oriented"]
-    names = ("nonmanifold_edges", "nonmanifold_vertices", "inverted", "new_intersections")
-    found += [f"{name} {validity[name]}" for name in names if validity[name]]
-    found += [
-        f"{name} {validity[name]} for {validity[f'{name}_input']}"
-        for name in ("euler", "components", "boundary_loops")
-        if validity[name] != validity[f"{name}_input"]
-    ]
-    if abs(row["vertices"] - row["vertices_asked"]) > COUNT_TOLERANCE * row["vertices_asked"]:
-        found.append(f"{row['vertices']} vertices for {row['vertices_asked']}")
-    return found
-
-
-def tables(rows: list[dict[str, Any]]) -> str:
-    lines = [
-        "| metric | s | ratio | meshes | G | G, working metric | G, least | flat triangles | creases | E2 [1e-7 D²] "
-        "| RMS over quadric decimation | largest | HD [1e-3 D] | time [s], mean | median | faults |",
-        "|" + "---|" * 16,
-    ]
-    for group in grouped(rows):
-        flat = [row["flat_quality"] for row in group if row["flat_quality"] is not None]
-        seconds = [row["seconds"]["total"] for row in group]
-        cells = [
-            *headings(group),
-            f"{mean(group, 'g_mean'):.3f}",
-            f"{mean(group, 'g_working'):.3f}",
-            f"{min(row['g_mean'] for row in group):.3f}",
-            f"{np.mean(flat):.3f}" if flat else "",
-            f"{mean(group, 'creases'):.1%}",
-            f"{geometric_mean(group, 'mean_square') * 1e7:.2f}",
-            f"{geometric_mean(group, 'over_quadric'):.2f}",
-            f"{max(row['over_quadric'] for row in group):.2f}",
-            f"{geometric_mean(group, 'hausdorff') * 1e3:.2f}",
-            f"{np.mean(seconds):.2f}",
-            f"{np.median(seconds):.2f}",
-            f"{sum(bool(faults(row)) for row in group)}",
-        ]
-        lines.append(f"| {' | '.join(cells)} |")
-    faulty = [row for row in rows if faults(row)]
-    lines += [
-        "",
-        *(f"{row['mesh']} {row['ratio']:.0%} s={row['sharpness']:g}: {', '.join(faults(row))}" for row in faulty),
-    ]
-    return "\n".join(lines)
-
-
-def grouped(rows: list[dict[str, Any]]) -> list[list[dict[str, Any]]]:
-    """Return the rows of each metric, sharpness, ratio and kind of mesh."""
-    groups: dict[tuple[str, float, float, str], list[dict[str, Any]]] = defaultdict(list)
-    for row in rows:
-        groups[key_of(row)[3], -row["sharpness"], -row["ratio"], row["kind"]].append(row)
-    return [group for _, group in sorted(groups.items())]
-
-
-def headings(group: list[dict[str, Any]]) -> list[str]:
-    """Return metric, sharpness, ratio, and number and kind of the meshes of a group."""
-    first = group[0]
-    return [
-        key_of(first)[3],
-        f"{first['sharpness']:g}",
-        f"{first['ratio']:.0%}",
-        f"{len(group)} {first['kind']}",
-    ]
-
-
-def comparison(before: list[dict[str, Any]], after: list[dict[str, Any]]) -> str:
-    """Return a table of what two versions have on the same runs."""
-    earlier = {key_of(row): row for row in before}
-    lines = [
-        "| metric | s | ratio | meshes | G | flat triangles | creases | RMS | HD | time | faults |",
-        "|" + "---|" * 11,
-    ]
-    for group in grouped([row for row in after if key_of(row) in earlier]):
-        pairs = [(earlier[key_of(row)], row) for row in group]
-        flat = [pair for pair in pairs if None not in (pair[0]["flat_quality"], pair[1]["flat_quality"])]
-        cells = [
-            *headings(group),
-            _means(pairs, lambda row: row["g_mean"]),
-            _means(flat, lambda row: row["flat_quality"]),
-            _means(pairs, lambda row: row["creases"]),
-            _factor(pairs, lambda row: row["mean_square"] ** 0.5),
-            _factor(pairs, lambda row: row["hausdorff"]),
-            _factor(pairs, lambda row: row["seconds"]["total"]),
-            " -> ".join(str(sum(bool(faults(pair[k])) for pair in pairs)) for k in range(2)),
-        ]
-        lines.append(f"| {' | '.join(cells)} |")
-    return "\n".join(lines)
-
-
-Pairs = list[tuple[dict[str, Any], dict[str, Any]]]
-
-
-def _means(pairs: Pairs, figure: Callable[[dict[str, Any]], float]) -> str:
-    """Return the means of a figure before and after."""
-    return " -> ".join(f"{np.mean([figure(pair[k]) for pair in pairs]):.3f}" for k in range(2)) if pairs else ""
-
-
-def _factor(pairs: Pairs, figure: Callable[[dict[str, Any]], float]) -> str:
-    """Return the geometric mean of the factors that a figure has changed by."""
-    logs = [np.log((figure(after) + EXACT) / (figure(before) + EXACT)) for before, after in pairs]
-    return f"x {np.exp(np.mean(logs)):.2f}"
-
-
-def mean(rows: list[dict[str, Any]], name: str) -> float:
-    return float(np.mean([row[name] for row in rows]))
-
-
-def geometric_mean(rows: list[dict[str, Any]], name: str) -> float:
-    """Return the geometric mean of figures, of which exact results (0) count as 1e-16."""
-    return float(np.exp(np.mean(np.log([max(row[name], 1e-16) for row in rows]))))
-
-
 def read_rows(path: Path, newest: str = "over_quadric") -> list[dict[str, Any]]:
     """Return the rows of earlier calls that have the figure added last; the ones of older versions are left out."""
     rows = [json.loads(line) for line in path.read_text().splitlines()] if path.exists() else []
     return [row for row in rows if newest in row]
 
 
-def main() -> None:
+def arguments() -> argparse.Namespace:
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--ratios", type=float, nargs="+", default=[1.0, 0.2, 0.1])
     parser.add_argument("--sharpness", type=float, nargs="+", default=[7.0, 1.0])
@@ -272,7 +147,11 @@ def main() -> None:
     parser.add_argument("--kind", choices=[BAD, CAD, SMOOTH], help="run only meshes of this kind")
     parser.add_argument("--fresh", action="store_true", help="discard earlier rows")
     parser.add_argument("--before", type=Path, help="rows of another version to compare with")
-    options = parser.parse_args()
+    return parser.parse_args()
+
+
+def main() -> None:
+    options = arguments()
     if "ANISOMESH_DATA" not in os.environ:
         sys.exit("set ANISOMESH_DATA to the folder of meshes")
     OUT.parent.mkdir(exist_ok=True)

@@ -5,10 +5,8 @@ from __future__ import annotations
 from dataclasses import dataclass, replace
 from typing import Any
 
-import numpy as np
 import numpy.typing as npt
 
-from anisomesh._arrays import EdgeMask, PointMask
 from anisomesh.caveats import caveats, losses_of_repair, losses_of_shape
 from anisomesh.cvt.lbfgs import Optimised
 from anisomesh.cvt.schedule import DualFeedback, optimise_sites
@@ -16,41 +14,24 @@ from anisomesh.deadline import Deadline
 from anisomesh.delaunay.creases import missing_on_creases
 from anisomesh.delaunay.dual import dual_squared_errors
 from anisomesh.delaunay.meshing import MeshingTask, ValidMesh, mesh_from_sites
-from anisomesh.embedding.embedder import checked_embedding
 from anisomesh.errors import OptionError
-from anisomesh.features.detect import WEAK_ANGLE, apexes, sharp_edges
-from anisomesh.features.network import FeatureNetwork, trace_features
 from anisomesh.features.tagged import distance_to_crease_edges
-from anisomesh.fitting.fit import FitPlan
 from anisomesh.fitting.target import FitTarget
 from anisomesh.fitting.valid import fit_without_faults
 from anisomesh.inputs import PreparedInput, prepared_input
 from anisomesh.io.convert import as_surface
-from anisomesh.memory import check_memory
-from anisomesh.mesh.closest_points import ClosestPoints
-from anisomesh.mesh.embedded_surface import EmbeddedSurface
-from anisomesh.mesh.geometry import unit_frame
 from anisomesh.mesh.surface import Surface
 from anisomesh.mesh.validity import Validity, check_validity
-from anisomesh.mesh.working_surface import working_surface
-from anisomesh.metric.field import MetricField, checked_field
-from anisomesh.metric.narrow_patches import limit_to_patches
-from anisomesh.metric.thin_walls import separate_thin_walls
-from anisomesh.metric.transfer import PlacedMetric
 from anisomesh.options import MIN_VERTICES, RemeshOptions, read_target, with_overrides
 from anisomesh.progress import OnStep, StepInfo, ignore_steps
 from anisomesh.resolve import (
     cvt_options,
-    embedder,
     embedding_name,
-    fit_plan,
-    follows_creases,
-    metric_source,
-    with_embedding_chosen,
 )
 from anisomesh.result import RemeshResult
 from anisomesh.run import OPTIMISATION_SHARE, Run
 from anisomesh.search import smallest_within
+from anisomesh.tasks import set_up
 from anisomesh.voronoi.restricted import RestrictedVoronoi
 
 MAX_STARTS = 3  # of the optimisation, with one seed after the other, for a mesh without faults
@@ -132,52 +113,22 @@ def remesh(
 
 def _remesh(source: PreparedInput, n: int, options: RemeshOptions, run: Run, *, nearest: bool = False) -> RemeshResult:
     """Remesh a prepared surface with n vertices; ``nearest`` if the distance counts more than the shape."""
-    prepared = source.prepared
-    with run.stage("prepare"):
-        frame = unit_frame(prepared.surface.points)
-        surface = prepared.surface.with_points(frame.to_unit(prepared.surface.points))
-        options = with_embedding_chosen(options, surface)
-        creases = sharp_edges(surface, min(options.feature_angle, WEAK_ANGLE))
-        split = working_surface(surface, n, creases=creases, tagged=source.tagged)
-        tips = apexes(split.coarse, sharp_edges(split.coarse, options.feature_angle))
-        check_memory(n, split.surface.n_faces)
-    with run.stage("metric"):
-        tensors = None if source.tensors is None else split.interpolate(source.tensors * frame.scale**2)
-        field = checked_field(metric_source(options, surface, tensors)(split.surface), split.surface)
-        working = split.surface
-        if field.points is not None:
-            working = working.with_points(field.points)
-            surface = split.coarse.with_points(field.points[: split.coarse.n_points])
-        field = limit_to_patches(field, working, n)
-    with run.stage("embed"):
-        apart = separate_thin_walls(field, working, n, options.feature_angle) if follows_creases(options) else field
-        embedding = checked_embedding(embedder(options)(working, apart), working)
-        density = None if source.density is None else split.interpolate(source.density)
-        embedded = EmbeddedSurface(working, embedding.points, embedding.scale, density)
-        task = MeshingTask(
-            voronoi=RestrictedVoronoi(embedded, threads=options.threads),
-            features=_features(embedded, n, split.tagged, tips, options),
-            surface=surface,
-            tensors=field.tensors,
-            n_vertices=n,
-            deadline=run.deadline,
-        )
-        plan = fit_plan(options, surface, nearest=nearest)
-        target = None if plan is None else _fit_target(task, working, field, plan, options.feature_angle)
+    prepared, tasks = source.prepared, set_up(source, n, options, run, nearest=nearest)
+    frame, task, field = tasks.frame, tasks.dual, tasks.field
     run.check_time()
-    made = _valid_mesh(task, target, options, run)
+    made = _valid_mesh(task, tasks.fit, tasks.options, run)
     mesh, optimised, validity = made.mesh, made.optimised, made.validity
     return RemeshResult(
         surface=Surface(frame.to_model(mesh.points), mesh.faces),
         prepared=prepared.surface,
         prepare_report=prepared.report,
-        working=working,
+        working=task.voronoi.embedded.surface,
         tensors=field.tensors,
         corner_tensors=field.corner_tensors,
-        embedding_name=embedding_name(options),
+        embedding_name=embedding_name(tasks.options),
         noise=field.noise,
         frame=frame,
-        embedding=embedding,
+        embedding=tasks.embedding,
         cells=mesh.cells,
         vertices_asked=n,
         energy=optimised.energy,
@@ -190,25 +141,12 @@ def _remesh(source: PreparedInput, n: int, options: RemeshOptions, run: Run, *, 
         seconds=run.total_seconds(),
         warnings=(
             *losses_of_repair(prepared.report),
-            *losses_of_shape(surface, Surface(mesh.points, mesh.faces), task.corner_places, made.feature_distance),
-            *caveats(n, field.noise, mesh, validity, optimised, options),
+            *losses_of_shape(
+                tasks.surface, Surface(mesh.points, mesh.faces), task.corner_places, made.feature_distance
+            ),
+            *caveats(n, field.noise, mesh, validity, optimised, tasks.options),
         ),
         feature_distance=made.feature_distance * frame.scale,
-    )
-
-
-def _fit_target(
-    task: MeshingTask, working: Surface, field: MetricField, plan: FitPlan, crease_angle: float
-) -> FitTarget:
-    """Return what meshes are fitted to; the field is on the working surface."""
-    return FitTarget.of(
-        task.reference,
-        PlacedMetric(ClosestPoints(working), field),
-        task.n_vertices,
-        corners=task.corner_places,
-        holds_creases=bool(task.features.required.any()),
-        crease_angle=crease_angle,
-        plan=plan,
     )
 
 
@@ -268,16 +206,3 @@ def _mesh_of_start(task: MeshingTask, target: FitTarget | None, options: RemeshO
     return _Made(
         mesh=mesh, optimised=optimised, validity=validity, feature_distance=feature_distance, seed=options.seed
     )
-
-
-def _features(
-    embedded: EmbeddedSurface, n: int, tagged: EdgeMask, tips: PointMask, options: RemeshOptions
-) -> FeatureNetwork:
-    """Return boundary, creases and apexes; with the plain CVT only the tagged edges.
-
-    ``tagged`` are edges (E,) of the embedded surface, and ``tips`` the apexes among its first points.
-    """
-    angle = options.feature_angle if follows_creases(options) else 180.0
-    sharp = sharp_edges(embedded.surface, angle) | tagged
-    apex = np.flatnonzero(tips & follows_creases(options))
-    return trace_features(embedded, n, sharp=sharp, required=tagged, apexes=apex)

@@ -6,19 +6,18 @@ from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
-import numpy.typing as npt
 
-from anisomesh._arrays import Faces, PointMask, Points, PointTensors, Sites
+from anisomesh._arrays import Faces, Points, PointTensors, Sites
 from anisomesh.deadline import NO_DEADLINE, Deadline
 from anisomesh.delaunay.delta_complex import simplicial_mesh
 from anisomesh.delaunay.dual import dual_mesh
 from anisomesh.delaunay.faults import points_at_faults
+from anisomesh.delaunay.feature_mesh import EdgeEnds, FeatureMesh, edges_left, renumbered
 from anisomesh.delaunay.placement import place_vertices
 from anisomesh.delaunay.topology_control import ControlledCells, control_topology
 from anisomesh.features.network import FeatureNetwork
 from anisomesh.mesh.closest_points import ClosestPoints
 from anisomesh.mesh.surface import Surface
-from anisomesh.mesh.topology import edge_keys, half_edges
 from anisomesh.mesh.validity import faulty_faces
 from anisomesh.meshops.decimation import decimate, ends_of_creases
 from anisomesh.meshops.edge_recovery import recover_edges
@@ -37,34 +36,6 @@ _TRIM_TRIES = 50  # pairs looked at in each of these
 _MAX_TRIES, _MAX_TRIES_COARSENED = 300, 1_000  # pairs of intersecting triangles looked at; for a coarsened input
 MAX_LOCKED_SHARE = 0.5  # of the vertices asked for: corners that collapses leave alone
 MAX_FIXED_SHARE = 0.6  # of the vertices asked for: points that creases fix; heuristic, chosen on training meshes
-
-EdgeEnds = npt.NDArray[np.int64]
-
-
-@dataclass(frozen=True, eq=False)
-class FeatureMesh:
-    """A mesh with edges along creases.
-
-    Attributes
-    ----------
-    points, faces
-        The mesh in space (V, 3), (F, 3).
-    crease_edges
-        Ends of its edges along creases (n, 2).
-    locked
-        Points that collapses keep (V,).
-    """
-
-    points: Points
-    faces: Faces
-    crease_edges: EdgeEnds
-    locked: PointMask
-
-    @classmethod
-    def of(cls, surface: Surface) -> FeatureMesh:
-        """Return a surface without creases or locked points."""
-        none = np.zeros((0, 2), dtype=np.int64)
-        return cls(surface.points, surface.faces, none, np.zeros(surface.n_points, dtype=bool))
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -109,7 +80,7 @@ class MeshingTask:
     def corner_places(self) -> Points:
         """Points of the surface that are corners of creases or apexes (n, 3)."""
         places = self.features.corner_places(self.voronoi.embedded.surface)
-        return places[_renumbered(places, self.surface.points) >= 0]
+        return places[renumbered(places, self.surface.points) >= 0]
 
     @cached_property
     def roots(self) -> PointTensors:
@@ -218,7 +189,7 @@ def _attempt(task: MeshingTask, sites: Sites, n_start: int) -> ValidMesh:
     return ValidMesh(
         points=points,
         faces=faces,
-        crease_edges=_edges_left(faces, _renumbered(mesh.points, points)[mesh.crease_edges]),
+        crease_edges=edges_left(faces, renumbered(mesh.points, points)[mesh.crease_edges]),
         cells=controlled.cells,
         inserted=max(n_first - n_start, 0) if dual is not None else 0,
         removed=max(n_first - len(points), 0),
@@ -236,7 +207,7 @@ def _dual_in_space(task: MeshingTask, controlled: ControlledCells) -> FeatureMes
         return None
     space = place_vertices(cells, task.features, controlled.boundary, creased, points, faces)
     faces = recover_edges(space, faces, creased.paths, task.reference)
-    links = _edges_left(faces, creased.links)
+    links = edges_left(faces, creased.links)
     locked = np.zeros(len(space), dtype=bool)
     locked[creased.cell[creased.corner][: int(MAX_LOCKED_SHARE * task.n_vertices)]] = True
     return FeatureMesh(space, faces, links, locked)
@@ -247,23 +218,11 @@ def _without_inverted(task: MeshingTask, mesh: FeatureMesh) -> FeatureMesh:
     points, faces, _ = remove_inverted_triangles(mesh.points, mesh.faces, task.reference, deadline=task.deadline)
     if points is mesh.points:
         return FeatureMesh(points, faces, mesh.crease_edges, mesh.locked)
-    number = _renumbered(mesh.points, points)
+    number = renumbered(mesh.points, points)
     locked = np.zeros(len(points), dtype=bool)
     locked[number[mesh.locked & (number >= 0)]] = True
     links = number[mesh.crease_edges]
     return FeatureMesh(points, faces, links[(links >= 0).all(axis=1)], locked)
-
-
-def _renumbered(before: Points, after: Points) -> npt.NDArray[np.int64]:
-    """Return the number that each point (V,) has afterwards, -1 if there is none at its place."""
-    places = {point.tobytes(): number for number, point in enumerate(after)}
-    return np.array([places.get(point.tobytes(), -1) for point in before], dtype=np.int64)
-
-
-def _edges_left(faces: Faces, ends: EdgeEnds) -> EdgeEnds:
-    """Return which pairs of points (n, 2) are edges of the faces; the points may be -1."""
-    ends = ends[(ends >= 0).all(axis=1)]
-    return ends[np.isin(edge_keys(ends), edge_keys(half_edges(faces)))]
 
 
 def _coarsened(task: MeshingTask, mesh: FeatureMesh) -> FeatureMesh:
