@@ -17,16 +17,17 @@ import numpy as np
 import torch
 
 from anisomesh.embedding.direct import embed
+from anisomesh.learn.architecture import NetworkOptions, PaperOptions
+from anisomesh.learn.graphs.hierarchy import N_EDGE_FEATURES, graph_hierarchy
 from anisomesh.learn.inference.predict import predict
-from anisomesh.learn.models.hierarchy import N_EDGE_FEATURES, graph_hierarchy
 from anisomesh.learn.models.messages import (
     max_aggregation,
     max_by_scatter,
     mean_aggregation,
     mean_by_scatter,
 )
-from anisomesh.learn.models.paper import PaperNetwork, PaperOptions, paper_input
-from anisomesh.learn.models.stretch import NetworkOptions, StretchNetwork
+from anisomesh.learn.models.paper import PaperNetwork, paper_input
+from anisomesh.learn.models.stretch import StretchNetwork
 from anisomesh.mesh.surface import Surface
 from anisomesh.metric.tensors import compute_metric
 from anisomesh.shapes.analytic import torus

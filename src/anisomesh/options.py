@@ -47,8 +47,8 @@ class RemeshOptions:
         units; or a :class:`~anisomesh.metric.field.MetricSource`, such as ``Curvature()`` or ``Neural("file")``.
     embedding
         ``"direct"``: the metric is measured; ``"neural"``: short for ``metric=Neural(weights, device, denoise)``;
-        ``"hybrid"``: the same for ``Hybrid``, a mean of both; ``"auto"``: hybrid where torch is installed, the
-        metric is ``"curvature"``, the only one that networks predict, and fewer than a tenth of the edges of the input
+        ``"hybrid"``: the same for ``Hybrid``, a mean of both; ``"auto"``: hybrid where the metric is
+        ``"curvature"``, the only one that networks predict, and fewer than a tenth of the edges of the input
         are flat, as on measured surfaces; else direct. Or an
         :class:`~anisomesh.embedding.embedder.Embedder`, such as ``Direct(iterations=20)``.
     energy
@@ -61,7 +61,7 @@ class RemeshOptions:
         For ``"neural"`` and ``"hybrid"``: a file of ``anisomesh train``, or the name of a pretrained network; by
         default the one called ``default``.
     device
-        Where the network runs, ``"cpu"`` or ``"cuda"``.
+        Where the network runs, ``"cpu"``, or ``"cuda"``, which needs torch.
     denoise
         Whether noise that a network finds in the input is removed first. Designed surfaces, on which a tenth of the
         edges or more are flat, are left as they are.

@@ -11,7 +11,6 @@ from anisomesh.cvt.schedule import CVTOptions
 from anisomesh.embedding.embedder import Direct, Embedder
 from anisomesh.features.detect import share_of_flat_edges
 from anisomesh.fitting.fit import FitOptions, FitPlan
-from anisomesh.learn import torch_is_there
 from anisomesh.learn.inference.source import Hybrid, Neural
 from anisomesh.mesh.surface import Surface
 from anisomesh.metric.field import MetricSource
@@ -48,8 +47,7 @@ def embedding_name(options: RemeshOptions) -> str:
         return "direct"
     if embedding != "auto":
         return embedding
-    network = options.weights is not None or torch_is_there()
-    return "hybrid" if network and isinstance(metric, str) and metric == "curvature" else "direct"
+    return "hybrid" if isinstance(metric, str) and metric == "curvature" else "direct"
 
 
 def with_embedding_chosen(options: RemeshOptions, surface: Surface) -> RemeshOptions:

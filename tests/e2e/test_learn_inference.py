@@ -7,18 +7,16 @@ from functools import cache
 import numpy as np
 import pytest
 
-torch = pytest.importorskip("torch")
-
-import anisomesh  # noqa: E402
-from anisomesh.errors import OptionError  # noqa: E402
-from anisomesh.evaluation.report import evaluate  # noqa: E402
-from anisomesh.learn.inference.predict import NOISE_FLOOR, predict  # noqa: E402
-from anisomesh.learn.inference.pretrained import pretrained_networks, weights_path  # noqa: E402
-from anisomesh.learn.models.checkpoint import load_weights  # noqa: E402
-from anisomesh.mesh.noise import with_noise  # noqa: E402
-from anisomesh.mesh.surface import Surface  # noqa: E402
-from anisomesh.repair.prepare import prepare  # noqa: E402
-from anisomesh.shapes.analytic import box, ellipsoid, sphere, torus, twisted_ring  # noqa: E402
+import anisomesh
+from anisomesh.errors import OptionError
+from anisomesh.evaluation.report import evaluate
+from anisomesh.learn.inference.predict import NOISE_FLOOR, predict
+from anisomesh.learn.inference.pretrained import pretrained_networks, weights_path
+from anisomesh.learn.weights_file import read_weights
+from anisomesh.mesh.noise import with_noise
+from anisomesh.mesh.surface import Surface
+from anisomesh.repair.prepare import prepare
+from anisomesh.shapes.analytic import box, ellipsoid, sphere, torus, twisted_ring
 
 
 @pytest.fixture(scope="module")
@@ -46,20 +44,20 @@ def unit_torus(n_major=70, n_minor=28):
 
 def test_the_default_network_is_there_and_says_what_it_is():
     assert "default" in pretrained_networks()
-    network, facts = load_weights(weights_path(None))
-    assert network.options.scales >= 3
-    assert {"epoch", "validation 0", "training"} <= set(facts)
+    weights = read_weights(weights_path(None))
+    assert weights.options.scales >= 3
+    assert {"epoch", "validation 0", "training"} <= set(weights.facts)
     assert weights_path("default") == weights_path(None)
 
 
 @pytest.mark.slow
-def test_a_prediction_does_not_import_the_compiler_of_torch():
-    """Regression: choosing deterministic algorithms imported it, which took 3 s of the first remesh of a process."""
+def test_a_prediction_does_not_import_torch():
+    """Regression: importing torch and its compiler took 5 s of the first remesh of a process."""
     code = (
         "import sys; from anisomesh.learn.inference.predict import predict\n"
         "from anisomesh.shapes.analytic import sphere\n"
         "ball = sphere(2); predict(ball.with_points(ball.points / ball.diagonal))\n"
-        "assert 'torch' in sys.modules and 'torch._inductor' not in sys.modules"
+        "assert 'torch' not in sys.modules"
     )
     subprocess.run([sys.executable, "-c", code], check=True)
 
@@ -185,9 +183,14 @@ def test_missing_weights_and_devices_are_refused(egg, tmp_path):
     ):
         with pytest.raises(kind, match=message):
             anisomesh.remesh(egg, n_vertices=100, **words)
-    if not torch.cuda.is_available():
-        with pytest.raises(OptionError, match="'cuda' cannot be used here"):
-            anisomesh.remesh(egg, n_vertices=100, embedding="neural", device="cuda")
+
+
+def test_a_gpu_that_is_not_there_is_refused(egg):
+    torch = pytest.importorskip("torch")
+    if torch.cuda.is_available():
+        pytest.skip("there is one")
+    with pytest.raises(OptionError, match="'cuda' cannot be used here"):
+        anisomesh.remesh(egg, n_vertices=100, embedding="neural", device="cuda")
 
 
 @pytest.mark.slow

@@ -20,17 +20,17 @@ from tensorboard.backend.event_processing.event_accumulator import EventAccumula
 import anisomesh  # noqa: E402
 from anisomesh.errors import OptionError  # noqa: E402
 from anisomesh.features.detect import WEAK_ANGLE, sharp_edges  # noqa: E402
+from anisomesh.learn.architecture import NetworkOptions, PaperOptions  # noqa: E402
 from anisomesh.learn.data.items import load_item  # noqa: E402
 from anisomesh.learn.data.manifest import ItemFiles, files_of  # noqa: E402
 from anisomesh.learn.inference.predict import predict  # noqa: E402
 from anisomesh.learn.inference.pretrained import weights_path  # noqa: E402
-from anisomesh.learn.models.checkpoint import WeightsError, load_state, load_weights, save_state  # noqa: E402
-from anisomesh.learn.models.paper import PaperOptions  # noqa: E402
-from anisomesh.learn.models.stretch import NetworkOptions  # noqa: E402
+from anisomesh.learn.models.checkpoint import load_state, load_weights, save_state  # noqa: E402
 from anisomesh.learn.training.config import TrainingOptions, load_training  # noqa: E402
 from anisomesh.learn.training.run import CHECKPOINT, EVENTS, METRICS, WEIGHTS, DivergedError  # noqa: E402
 from anisomesh.learn.training.tasks import StretchTask  # noqa: E402
 from anisomesh.learn.training.train import train  # noqa: E402
+from anisomesh.learn.weights_file import WeightsError  # noqa: E402
 from anisomesh.mesh.geometry import unit_frame  # noqa: E402
 from anisomesh.mesh.working_surface import working_surface  # noqa: E402
 from conftest import CLI  # noqa: E402
@@ -373,20 +373,20 @@ def test_a_remesh_takes_the_metric_of_a_trained_network(files, tmp_path, run_cli
 
 
 @pytest.mark.slow
-def test_without_torch_the_error_names_the_extra(tmp_path, torus_obj):
+def test_networks_run_without_torch_and_the_error_of_a_gpu_names_the_extra(torus_obj):
     code = (
-        "import sys; sys.modules['torch'] = None\n"
+        "import sys; sys.modules['torch'] = sys.modules['safetensors'] = None\n"
         "import anisomesh; from anisomesh.errors import AnisomeshError\n"
         f"s = anisomesh.load({str(torus_obj)!r})\n"
         "result = anisomesh.remesh(s, n_vertices=50, max_iterations=2)\n"
         "print(result.surface.n_points, result.embedding_name)\n"
-        "try: anisomesh.remesh(s, n_vertices=50, embedding='neural', weights='x')\n"
+        "try: anisomesh.remesh(s, n_vertices=50, embedding='neural', device='cuda')\n"
         "except AnisomeshError as error: print(error)\n"
     )
     done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
     first, second = done.stdout.strip().splitlines()
-    assert first == "50 direct"
-    assert 'pip install "anisomesh[learn]"' in second
+    assert first == "50 hybrid"
+    assert 'pip install "anisomesh[train]"' in second
 
 
 @pytest.mark.slow

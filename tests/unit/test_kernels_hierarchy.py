@@ -5,7 +5,7 @@ import pytest
 from scipy.spatial.transform import Rotation
 
 from anisomesh._kernels import graph_hierarchy as kernels
-from anisomesh.learn.models.graph import graph_from_edges
+from anisomesh.learn.graphs.graph import graph_from_edges
 from anisomesh.mesh.geometry import unit
 from anisomesh.metric.tangent import tangent_frames
 from anisomesh.shapes.analytic import torus

@@ -7,7 +7,7 @@ import pytest
 
 torch = pytest.importorskip("torch")
 
-from anisomesh.learn.models.graph import coarsen, graph_from_edges  # noqa: E402
+from anisomesh.learn.graphs.graph import coarsen, graph_from_edges  # noqa: E402
 from anisomesh.learn.models.messages import (  # noqa: E402
     distances_by_gather,
     max_aggregation,

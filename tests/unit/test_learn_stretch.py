@@ -5,12 +5,13 @@ import pytest
 
 torch = pytest.importorskip("torch")
 
+from anisomesh.learn.architecture import NetworkOptions  # noqa: E402
 from anisomesh.learn.data.examples import stretch_example  # noqa: E402
 from anisomesh.learn.data.items import Item  # noqa: E402
-from anisomesh.learn.models.graph import graph_from_edges  # noqa: E402
-from anisomesh.learn.models.hierarchy import N_EDGE_FEATURES, N_NODE_FEATURES, graph_hierarchy  # noqa: E402
+from anisomesh.learn.graphs.graph import graph_from_edges  # noqa: E402
+from anisomesh.learn.graphs.hierarchy import N_EDGE_FEATURES, N_NODE_FEATURES, graph_hierarchy  # noqa: E402
 from anisomesh.learn.models.messages import mean_by_scatter  # noqa: E402
-from anisomesh.learn.models.stretch import NetworkOptions, ResidualBlock, StretchNetwork  # noqa: E402
+from anisomesh.learn.models.stretch import ResidualBlock, StretchNetwork  # noqa: E402
 from anisomesh.learn.training.config import TrainingOptions  # noqa: E402
 from anisomesh.learn.training.losses import line_loss, offset_loss  # noqa: E402
 from anisomesh.learn.training.tasks import StretchTask  # noqa: E402
@@ -182,7 +183,7 @@ def test_it_does_not_matter_how_many_edges_are_worked_on_at_once(monkeypatch):
     torch.manual_seed(0)
     surface, network = shaken(torus(n_major=24, n_minor=12)), StretchNetwork(SMALL).eval()
     whole, offsets = predicted(network, surface)
-    monkeypatch.setattr("anisomesh.learn.models.stretch._EDGES_PER_CHUNK", 7)
+    monkeypatch.setattr("anisomesh.learn.models.stretch.EDGES_PER_CHUNK", 7)
     parts, other_offsets = predicted(network, surface)
     np.testing.assert_allclose(parts, whole, rtol=1e-5, atol=1e-5)  # entries are about 1, of single precision
     np.testing.assert_allclose(other_offsets, offsets, atol=1e-4 * np.abs(offsets).max())

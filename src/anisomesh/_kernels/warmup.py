@@ -17,6 +17,7 @@ from anisomesh._kernels import (
     messages,
     neighbours,
     orientation,
+    products,
 )
 
 _REMESH = (
@@ -41,6 +42,7 @@ _FIT = (  # exchanges of edges compile more, where there are any
 )
 _DECIMATE = (decimate.set_quadrics, decimate.decimate)
 _NETWORK = (
+    products.add_product,
     messages.mean_messages,
     graph_hierarchy.maximal_independent_set,
     graph_hierarchy.edge_geometry,

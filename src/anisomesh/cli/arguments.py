@@ -70,7 +70,7 @@ REMESH_OPTIONS: dict[str, Any] = {
         EmbeddingName,
         _option(
             help="Source of the metric. direct: measured curvature; neural: a network; hybrid: the mean of both; auto: "
-            "hybrid if torch is installed, the metric is curvature and the input is not a designed part, else direct."
+            "hybrid if the metric is curvature and the input is not a designed part, else direct."
         ),
     ],
     "weights": Annotated[

@@ -1,22 +1,15 @@
 """Networks that predict the metric of a mesh and remove its noise, and their training.
 
 :mod:`.inference` applies networks, pretrained ones among them; :mod:`.models` has the networks, :mod:`.data` the data
-sets and :mod:`.training` the training; ``weights`` has the pretrained networks. Only modules of this package import
-torch, and this one does not.
+sets and :mod:`.training` the training; ``weights`` has the pretrained networks. Networks run without torch. Only
+:mod:`.models`, :mod:`.training` and :mod:`.inference.on_device` import it.
 """
-
-import importlib.util
 
 from anisomesh.errors import AnisomeshError
 
 
 class LearningError(AnisomeshError):
-    """A package that networks need is not installed."""
-
-
-def torch_is_there() -> bool:
-    """Return whether torch and safetensors are installed, without importing them."""
-    return all(importlib.util.find_spec(name) is not None for name in ("torch", "safetensors"))
+    """A package that training needs is not installed."""
 
 
 def require_torch() -> None:
@@ -32,6 +25,6 @@ def require_torch() -> None:
         import torch  # noqa: F401
     except ImportError as error:
         raise LearningError(
-            f"{error.name} is not installed; the neural embedding and its training need it: "
-            'pip install "anisomesh[learn]"'
+            f"{error.name} is not installed; training and networks on other devices than the CPU need it: "
+            'pip install "anisomesh[train]"'
         ) from error

@@ -9,7 +9,7 @@ import torch
 from torch import Tensor
 
 from anisomesh.learn.data.items import Item
-from anisomesh.learn.models.hierarchy import GraphHierarchy, graph_hierarchy
+from anisomesh.learn.graphs.hierarchy import GraphHierarchy, graph_hierarchy
 from anisomesh.mesh.geometry import sums_at_points
 from anisomesh.mesh.noise import Noise, with_noise
 from anisomesh.metric.line_field import line_field_components, principal_stretch

@@ -3,23 +3,21 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Iterator
-from contextlib import contextmanager
 from dataclasses import dataclass
 from functools import lru_cache
 from pathlib import Path
 
 import numpy as np
-import torch
 
 from anisomesh._arrays import EmbeddedPoints, Points, PointTensors
 from anisomesh.embedding.precomputed import pulled_back_metric
+from anisomesh.learn import require_torch
+from anisomesh.learn.architecture import PaperOptions
+from anisomesh.learn.graphs.hierarchy import graph_hierarchy
+from anisomesh.learn.inference.paper import PaperInference
 from anisomesh.learn.inference.pretrained import weights_path
-from anisomesh.learn.models.checkpoint import Network, load_weights
-from anisomesh.learn.models.device import deterministic, resolve_device
-from anisomesh.learn.models.hierarchy import graph_hierarchy
-from anisomesh.learn.models.paper import PaperNetwork, paper_input
-from anisomesh.learn.models.stretch import StretchNetwork
+from anisomesh.learn.inference.stretch import StretchInference
+from anisomesh.learn.weights_file import WeightsError, read_weights
 from anisomesh.mesh.surface import Surface
 from anisomesh.metric.line_field import tensors_of_line_field
 
@@ -64,7 +62,7 @@ def predict(
     weights
         A file written by training, or the name of a pretrained network; None for the default network.
     device
-        Torch device of the network.
+        ``"cpu"``, or a torch device, which needs torch.
     denoise
         Whether noise found by the default network is removed before its metric is predicted.
 
@@ -74,6 +72,8 @@ def predict(
         If the file cannot be read as weights.
     OptionError
         If there is no such file or device.
+    LearningError
+        If the device needs torch, and it is not installed.
     MemoryError
         If there is too little memory on the device or the host.
 
@@ -83,38 +83,27 @@ def predict(
     applied again to the surface without the noise, at most ``MAX_DENOISING_STEPS`` times.
     """
     path = weights_path(weights).resolve()
-    network = _load_cached(path, path.stat().st_mtime_ns, resolve_device(device))
-    with torch.inference_mode(), _one_thread(), deterministic():
-        try:
-            if isinstance(network, StretchNetwork):
-                return _predict_stretch(network, surface, denoise=denoise)
-            return _predict_embedding(network, surface)
-        except RuntimeError as error:  # torch has no error type for host memory
-            if isinstance(error, torch.OutOfMemoryError) or "allocate memory" in str(error):
-                raise MemoryError(str(error)) from error
-            raise
+    network = _network(path, path.stat().st_mtime_ns, device)
+    if isinstance(network, PaperInference):
+        extra = network(surface).astype(np.float64)
+        return Predicted(tensors=pulled_back_metric(surface, extra), points=surface.points, extra=extra)
+    return _predict_stretch(network, surface, denoise=denoise)
 
 
-def _predict_stretch(network: StretchNetwork, surface: Surface, *, denoise: bool) -> Predicted:
+def _predict_stretch(network: StretchInference, surface: Surface, *, denoise: bool) -> Predicted:
     """Return the metric of the surface, or of the surface without noise after up to three steps if there is some."""
     current = surface
     for step in range(1 + MAX_DENOISING_STEPS):
         hierarchy = graph_hierarchy(current, network.options.scales)
-        found = network(hierarchy)
-        offsets = found.offsets.cpu().numpy().astype(np.float64)
+        line_field, offsets = network(hierarchy)
         if not denoise or step == MAX_DENOISING_STEPS or _rms_height(current, offsets) < NOISE_FLOOR:
             break
-        current = current.with_points(current.points + offsets)
+        current = current.with_points(current.points + offsets.astype(np.float64))
     return Predicted(
-        tensors=tensors_of_line_field(found.line_field.cpu().numpy(), hierarchy.frames),
+        tensors=tensors_of_line_field(line_field, hierarchy.frames),
         points=current.points,
         noise=_rms_height(surface, current.points - surface.points),
     )
-
-
-def _predict_embedding(network: PaperNetwork, surface: Surface) -> Predicted:
-    extra = network(paper_input(surface)).cpu().numpy().astype(np.float64)
-    return Predicted(tensors=pulled_back_metric(surface, extra), points=surface.points, extra=extra)
 
 
 def _rms_height(surface: Surface, offsets: Points) -> float:
@@ -123,18 +112,18 @@ def _rms_height(surface: Surface, offsets: Points) -> float:
     return float(np.sqrt((heights**2).mean()) / surface.edge_lengths.mean())
 
 
-@contextmanager
-def _one_thread() -> Iterator[None]:
-    """Use one thread of torch within the block, so that sums have the same order on every machine."""
-    before = torch.get_num_threads()
-    torch.set_num_threads(1)
-    try:
-        yield
-    finally:
-        torch.set_num_threads(before)
-
-
 @lru_cache(maxsize=4)
-def _load_cached(path: Path, changed: int, device: torch.device) -> Network:
+def _network(path: Path, changed: int, device: str) -> StretchInference | PaperInference:
     """Return the network in a file; ``changed``, its time of modification, invalidates the cache."""
-    return load_weights(path)[0].to(device).eval()
+    if device != "cpu":
+        require_torch()
+        from anisomesh.learn.inference.on_device import network_on
+
+        return network_on(path, device)
+    weights = read_weights(path)
+    try:
+        if isinstance(weights.options, PaperOptions):
+            return PaperInference(weights.options, weights.arrays)
+        return StretchInference(weights.options, weights.arrays)
+    except WeightsError as error:
+        raise WeightsError(f"{path}: does not hold the weights of a known network: {error}") from error

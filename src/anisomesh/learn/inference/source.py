@@ -1,4 +1,4 @@
-"""Metric sources that ask a trained network; torch is imported when they are called."""
+"""Metric sources that ask a trained network."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ import numpy as np
 
 from anisomesh._arrays import PointTensors
 from anisomesh.errors import OptionError
-from anisomesh.learn import require_torch
+from anisomesh.learn.inference.predict import predict
 from anisomesh.mesh.surface import Surface
 from anisomesh.metric.curvature import DEFAULT_RADIUS, MAX_FLAT_CURVATURE, principal_curvatures
 from anisomesh.metric.field import MetricField
@@ -30,7 +30,7 @@ class Neural:
     weights
         A file of ``anisomesh train``, or the name of a pretrained network; None for the default one.
     device
-        ``"cpu"`` or ``"cuda"``.
+        ``"cpu"``, or ``"cuda"``, which needs torch.
     denoise
         Whether noise that the network finds is removed from the points. ``remesh`` removes none from designed
         surfaces, on which a tenth of the edges or more are flat.
@@ -56,13 +56,10 @@ class Neural:
         Raises
         ------
         WeightsError, LearningError
-            If the network cannot be loaded, or torch is not installed.
+            If the network cannot be loaded, or the device needs torch and it is not installed.
         OptionError
             If there are no such weights, or the device cannot be used.
         """
-        require_torch()
-        from anisomesh.learn.inference.predict import predict
-
         found = predict(surface, self.weights, device=self.device, denoise=self.denoise)
         points = found.points if found.noise > 0.0 else None
         return MetricField(tensors=found.tensors, points=points, extra=found.extra, noise=found.noise)

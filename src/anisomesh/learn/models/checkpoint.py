@@ -7,26 +7,18 @@ from dataclasses import asdict
 from pathlib import Path
 from typing import Any
 
+import numpy.typing as npt
 import torch
-from safetensors import SafetensorError
-from safetensors.torch import load, save
+from safetensors.torch import save
 from torch import Tensor, nn
 
-from anisomesh.errors import AnisomeshError
 from anisomesh.io.atomic import atomic_path
-from anisomesh.learn.models.paper import PaperNetwork, PaperOptions
-from anisomesh.learn.models.stretch import NetworkOptions, StretchNetwork
+from anisomesh.learn.models.paper import PaperNetwork
+from anisomesh.learn.models.stretch import StretchNetwork
+from anisomesh.learn.weights_file import OPTIONS_OF_KIND, WeightsError, read_safetensors, read_weights
 
-
-class WeightsError(AnisomeshError):
-    """A file of weights or a checkpoint cannot be read, or is of another network."""
-
-
-NETWORK_KINDS: dict[str, tuple[Any, Any]] = {
-    "default": (StretchNetwork, NetworkOptions),
-    "paper": (PaperNetwork, PaperOptions),
-}
-"""Class of the network and of its options for each kind in a file of weights."""
+NETWORKS: dict[str, Any] = {"default": StretchNetwork, "paper": PaperNetwork}
+"""Class of the network for each kind in a file of weights."""
 
 Network = StretchNetwork | PaperNetwork
 
@@ -39,7 +31,7 @@ def save_weights(network: Network, path: Path, facts: dict[str, Any]) -> None:
     MeshFileError
         If the file cannot be written.
     """
-    kind = next(name for name, (network_class, _) in NETWORK_KINDS.items() if isinstance(network, network_class))
+    kind = next(name for name, network_class in NETWORKS.items() if isinstance(network, network_class))
     header = {"kind": kind, "network": json.dumps(asdict(network.options)), "facts": json.dumps(facts)}
     _write(path, save({name: value.contiguous() for name, value in network.state_dict().items()}, metadata=header))
 
@@ -52,14 +44,19 @@ def load_weights(path: Path) -> tuple[Network, dict[str, Any]]:
     WeightsError
         If the file is missing, damaged, or has no weights of a known network.
     """
-    tensors, header = _read(path)
+    found = read_weights(path)
+    kind = next(name for name, options_class in OPTIONS_OF_KIND.items() if isinstance(found.options, options_class))
+    network: Network = NETWORKS[kind](found.options)
     try:
-        network_class, options_class = NETWORK_KINDS[header["kind"]]
-        network: Network = network_class(options_class(**json.loads(header["network"])))
-        network.load_state_dict(tensors)
-        return network, json.loads(header["facts"])
-    except (KeyError, TypeError, RuntimeError, json.JSONDecodeError) as error:
+        network.load_state_dict(tensors_of(found.arrays))
+    except RuntimeError as error:
         raise WeightsError(f"{path}: does not hold the weights of a known network: {error}") from error
+    return network, found.facts
+
+
+def tensors_of(arrays: dict[str, npt.NDArray[Any]]) -> dict[str, Tensor]:
+    """Return copies of arrays as tensors."""
+    return {name: torch.from_numpy(array.copy()) for name, array in arrays.items()}
 
 
 def save_state(path: Path, network: nn.Module, optimiser: torch.optim.Optimizer, state: dict[str, Any]) -> None:
@@ -85,7 +82,8 @@ def load_state(path: Path, network: nn.Module, optimiser: torch.optim.Optimizer)
     WeightsError
         If the file is missing, damaged, or a checkpoint of another network.
     """
-    tensors, header = _read(path)
+    arrays, header = read_safetensors(path)
+    tensors = tensors_of(arrays)
     try:
         weights = {
             name.removeprefix("weights."): value for name, value in tensors.items() if name.startswith("weights.")
@@ -110,13 +108,3 @@ def load_state(path: Path, network: nn.Module, optimiser: torch.optim.Optimizer)
 def _write(path: Path, data: bytes) -> None:
     with atomic_path(path) as temporary:
         Path(temporary).write_bytes(data)
-
-
-def _read(path: Path) -> tuple[dict[str, Tensor], dict[str, str]]:
-    try:
-        data = path.read_bytes()
-        length = int.from_bytes(data[:8], "little")
-        header = json.loads(data[8 : 8 + length]).get("__metadata__", {})
-        return load(data), header
-    except (OSError, ValueError, AttributeError, SafetensorError) as error:
-        raise WeightsError(f"{path}: cannot be read as safetensors: {error}") from error

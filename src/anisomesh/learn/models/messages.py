@@ -16,9 +16,8 @@ from anisomesh._kernels.messages import (
     mean_messages,
     mean_messages_gradient,
 )
-from anisomesh.learn.models.graph import Graph
-
-_DISTANCE_SOFTENING = 1e-12  # squared units of features: keeps the root differentiable where features are equal
+from anisomesh.learn.architecture import DISTANCE_SOFTENING
+from anisomesh.learn.graphs.graph import Graph
 
 
 class _MaxMessages(torch.autograd.Function):
@@ -90,7 +89,7 @@ class _Distances(torch.autograd.Function):
     def forward(context: Any, values: Tensor, graph: Graph) -> Tensor:
         values = values.detach().contiguous()
         distance = torch.empty(len(graph.neighbour), dtype=torch.float32)
-        feature_distances(graph.first, graph.neighbour, values.numpy(), _DISTANCE_SOFTENING, distance.numpy())
+        feature_distances(graph.first, graph.neighbour, values.numpy(), DISTANCE_SOFTENING, distance.numpy())
         context.graph = graph
         context.save_for_backward(values, distance)
         return distance[:, None]
@@ -120,7 +119,7 @@ def distances_by_gather(values: Tensor, graph: Graph) -> Tensor:
     """Return :func:`neighbour_distances` computed with torch operations, on any device."""
     edges = graph.edges_on(values.device)
     difference = values[edges.neighbour] - values[edges.node]
-    return torch.sqrt((difference * difference).sum(dim=1, keepdim=True) + _DISTANCE_SOFTENING)
+    return torch.sqrt((difference * difference).sum(dim=1, keepdim=True) + DISTANCE_SOFTENING)
 
 
 class _MeanMessages(torch.autograd.Function):

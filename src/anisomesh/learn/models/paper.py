@@ -1,6 +1,6 @@
 """The network of the paper: a Graph U-Net with Top-K pooling, from points and normals to the extra coordinates.
 
-Names of modules, and the fields of :class:`PaperOptions`, are the names in files of weights and configurations.
+Names of modules, are the names in files of weights and configurations.
 """
 
 from __future__ import annotations
@@ -10,47 +10,16 @@ from dataclasses import dataclass
 import numpy as np
 import numpy.typing as npt
 import torch
-from scipy.sparse import csr_array
-from scipy.spatial import cKDTree
 from torch import Tensor, nn
 
-from anisomesh.errors import OptionError
-from anisomesh.learn.models.graph import Graph, graph_from_edges, mesh_graph
+from anisomesh.learn.architecture import LEAKY_SLOPE, PAPER_INPUTS, PAPER_OUTPUTS, PaperOptions
+from anisomesh.learn.graphs.graph import Graph, mesh_graph
+from anisomesh.learn.graphs.pooling import connected_within_two_edges, interpolation_weights
 from anisomesh.learn.models.messages import max_aggregation, neighbour_distances
-from anisomesh.learn.models.stretch import LEAKY_SLOPE, MeshNorm, linear_of_concatenation
+from anisomesh.learn.models.stretch import MeshNorm, linear_of_concatenation
 from anisomesh.mesh.surface import Surface
 
-INPUTS, OUTPUTS = 6, 5
-"""Numbers of coordinates in (points and normals) and out (of the embedding beyond the first three)."""
-
 _OUTPUT_SCALE = 0.01  # heuristic: coordinates of size 1 before training would be edges a hundred times too long
-_N_INTERPOLATED = 3  # kept nodes that a dropped node is interpolated from
-
-
-@dataclass(frozen=True, kw_only=True)
-class PaperOptions:
-    """Sizes of the paper's network.
-
-    Attributes
-    ----------
-    channels
-        Channels of a node; 256 in the paper.
-    levels
-        Number of poolings.
-    ratio
-        Share of the nodes that a pooling keeps.
-    """
-
-    channels: int = 64
-    levels: int = 5
-    ratio: float = 0.5
-
-    def __post_init__(self) -> None:
-        if self.channels < 1 or self.levels < 0 or not 0.0 < self.ratio <= 1.0:
-            raise OptionError(
-                f"[paper] channels = {self.channels}, levels = {self.levels}, ratio = {self.ratio}; "
-                "expected at least 1 channel, no negative number of levels, and a ratio above 0 and at most 1"
-            )
 
 
 @dataclass(frozen=True, eq=False)
@@ -137,11 +106,13 @@ class PaperNetwork(nn.Module):
         super().__init__()
         self.options = options
         channels = options.channels
-        self.down = nn.ModuleList(PaperBlock(INPUTS if k == 0 else channels, channels) for k in range(options.levels))
+        self.down = nn.ModuleList(
+            PaperBlock(PAPER_INPUTS if k == 0 else channels, channels) for k in range(options.levels)
+        )
         self.pools = nn.ModuleList(TopKPooling(channels, options.ratio) for _ in range(options.levels))
         self.bottom = PaperBlock(channels, channels)
         self.up = nn.ModuleList(PaperBlock(channels, channels) for _ in range(options.levels))
-        self.out = nn.Linear(channels, OUTPUTS)
+        self.out = nn.Linear(channels, PAPER_OUTPUTS)
         with torch.no_grad():
             self.out.weight.mul_(_OUTPUT_SCALE)
 
@@ -153,7 +124,7 @@ class PaperNetwork(nn.Module):
             x = block(x, graph)
             pooled, kept = pool(x)
             skipped.append((x, graph, points, kept))
-            x, graph, points = pooled, _connected_within_two_edges(graph, kept), points[kept]
+            x, graph, points = pooled, connected_within_two_edges(graph, kept), points[kept]
         x = self.bottom(x, graph)
         for block, (before, graph, points, kept) in zip(self.up, reversed(skipped), strict=True):
             x = block(before + interpolated(x, points, kept), graph)
@@ -163,21 +134,5 @@ class PaperNetwork(nn.Module):
 
 def interpolated(x: Tensor, points: npt.NDArray[np.float64], kept: npt.NDArray[np.int64]) -> Tensor:
     """Return values (V, C) at points (V, 3) from values (V', C) at the kept points, weighted by inverse distance."""
-    k = min(_N_INTERPOLATED, len(kept))
-    distance, nearest = cKDTree(points[kept]).query(points, k=k)
-    distance, nearest = distance.reshape(len(points), k), nearest.reshape(len(points), k)
-    weight = 1.0 / np.maximum(distance, 1e-12)
-    weight /= weight.sum(axis=1, keepdims=True)
-    weights = torch.from_numpy(weight.astype(np.float32)).to(x.device)
-    return (weights[:, :, None] * x[torch.from_numpy(nearest.astype(np.int64)).to(x.device)]).sum(dim=1)
-
-
-def _connected_within_two_edges(graph: Graph, kept: npt.NDArray[np.int64]) -> Graph:
-    """Return the graph of the kept nodes, with an edge where a path of one or two edges connects two of them."""
-    n = graph.n_nodes
-    adjacency = csr_array((np.ones(len(graph.neighbour), dtype=np.float32), graph.neighbour, graph.first), shape=(n, n))
-    rows = adjacency[kept]
-    near = ((rows @ adjacency) + rows)[:, kept].tocoo()
-    apart = near.row != near.col
-    start, end = near.row[apart].astype(np.int32), near.col[apart].astype(np.int32)
-    return graph_from_edges(len(kept), start, end, np.zeros((len(start), 1), dtype=np.float32))
+    nearest, weights = (torch.from_numpy(table).to(x.device) for table in interpolation_weights(points, kept))
+    return (weights[:, :, None] * x[nearest]).sum(dim=1)

@@ -1,19 +1,28 @@
 """The default network: from a graph hierarchy to a line field of stretch, and to offsets that remove noise.
 
-Names of modules, and the fields of :class:`NetworkOptions`, are the names in files of weights and configurations.
+Names of modules, are the names in files of weights and configurations.
 """
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from typing import NamedTuple
 
 import torch
 from torch import Tensor, nn
 
-from anisomesh.errors import OptionError
-from anisomesh.learn.models.graph import EdgeTensors, Graph
-from anisomesh.learn.models.hierarchy import (
+from anisomesh.learn.architecture import (
+    EDGES_PER_CHUNK,
+    HEAD_LINES,
+    HEAD_ROUNDS,
+    HEAD_WIDTH,
+    INPUT_SCALE,
+    LEAKY_SLOPE,
+    NORM_EPSILON,
+    OFFSET_SCALE,
+    NetworkOptions,
+)
+from anisomesh.learn.graphs.graph import EdgeTensors, Graph
+from anisomesh.learn.graphs.hierarchy import (
     N_EDGE_FEATURES,
     N_NODE_FEATURES,
     N_NORMAL_LEVELS,
@@ -21,45 +30,6 @@ from anisomesh.learn.models.hierarchy import (
     HierarchyLevel,
 )
 from anisomesh.learn.models.messages import mean_aggregation
-
-LEAKY_SLOPE = 0.1
-"""Slope of the leaky rectifiers below zero."""
-
-_NORM_EPSILON = 1e-5  # added to the variance of a channel, the default of torch
-_INPUT_SCALE = 0.3  # heuristic: brings the input features to about 1; normalising would hide how large curvatures are
-_OFFSET_SCALE = 0.1  # heuristic: offsets are small before training
-_EDGES_PER_CHUNK = 8_192  # edges of a head at a time, which bounds its memory
-_HEAD_WIDTH = 32  # channels of an edge inside a head
-_HEAD_LINES, _HEAD_ROUNDS = 4, 2  # lines per node inside a head, and rounds of mixing them with the neighbours' lines
-
-
-@dataclass(frozen=True, kw_only=True)
-class NetworkOptions:
-    """Sizes of the network.
-
-    Attributes
-    ----------
-    channels
-        Channels of a node.
-    scales
-        Levels of the graph hierarchy.
-    blocks
-        Residual blocks on each level, on the way down and on the way up.
-    heads
-        Levels, from the finest, whose edges contribute to the line field.
-    """
-
-    channels: int = 64
-    scales: int = 5
-    blocks: int = 2
-    heads: int = 3
-
-    def __post_init__(self) -> None:
-        for name in ("channels", "scales", "blocks", "heads"):
-            if getattr(self, name) < 1:
-                raise OptionError(f"[network] {name} = {getattr(self, name)}; expected at least 1")
-        if self.heads > self.scales:
-            raise OptionError(f"[network] heads = {self.heads}; expected no more than scales, {self.scales}")
 
 
 class MeshNorm(nn.Module):
@@ -74,7 +44,7 @@ class MeshNorm(nn.Module):
         """Return (V, C) from (V, C)."""
         if len(x) < 2:  # batch_norm needs two nodes; a single node is its own mean
             return (x - x) * self.scale + self.shift
-        return nn.functional.batch_norm(x, None, None, self.scale, self.shift, training=True, eps=_NORM_EPSILON)
+        return nn.functional.batch_norm(x, None, None, self.scale, self.shift, training=True, eps=NORM_EPSILON)
 
 
 class MeanConvolution(nn.Module):
@@ -138,19 +108,19 @@ class EquivariantHead(nn.Module):
 
     def __init__(self, channels: int) -> None:
         super().__init__()
-        self.start = nn.Linear(channels, _HEAD_WIDTH)
-        self.end = nn.Linear(channels, _HEAD_WIDTH, bias=False)
-        self.along = nn.Linear(N_EDGE_FEATURES, _HEAD_WIDTH, bias=False)
-        self.of_edges = nn.Linear(_HEAD_WIDTH, (2 + _HEAD_ROUNDS) * _HEAD_LINES + 1)
-        self.of_nodes = nn.Linear(channels, (2 + _HEAD_ROUNDS) * _HEAD_LINES)
+        self.start = nn.Linear(channels, HEAD_WIDTH)
+        self.end = nn.Linear(channels, HEAD_WIDTH, bias=False)
+        self.along = nn.Linear(N_EDGE_FEATURES, HEAD_WIDTH, bias=False)
+        self.of_edges = nn.Linear(HEAD_WIDTH, (2 + HEAD_ROUNDS) * HEAD_LINES + 1)
+        self.of_nodes = nn.Linear(channels, (2 + HEAD_ROUNDS) * HEAD_LINES)
 
     def forward(self, x: Tensor, level: HierarchyLevel) -> tuple[Tensor, Tensor]:
         """Return lines (V, 2) and vectors (V, 3) from (V, C)."""
         edges, device = level.graph.edges_on(x.device), x.device
         share = 1.0 / torch.bincount(edges.node, minlength=len(x)).clamp(min=1)
         of_edges = self._edge_coefficients(x, edges, share)
-        direct, fitted, *mixing, vector = torch.split(of_edges, [_HEAD_LINES] * (2 + _HEAD_ROUNDS) + [1], dim=1)
-        curved, last, *keeping = torch.split(self.of_nodes(x), _HEAD_LINES, dim=1)
+        direct, fitted, *mixing, vector = torch.split(of_edges, [HEAD_LINES] * (2 + HEAD_ROUNDS) + [1], dim=1)
+        curved, last, *keeping = torch.split(self.of_nodes(x), HEAD_LINES, dim=1)
         directions, fit_weights, transport, vectors, curvature_line = (
             torch.from_numpy(values).to(device)
             for values in (level.directions, level.fit_weights, level.transport, level.vectors, level.curvature_line)
@@ -166,7 +136,7 @@ class EquivariantHead(nn.Module):
         """Return the coefficients of the edges (E, ...) times the shares of their nodes (V,), in chunks of edges."""
         start, end = self.start(x), self.end(x)
         parts = []
-        for node, neighbour, features in zip(*(torch.split(part, _EDGES_PER_CHUNK) for part in edges), strict=True):
+        for node, neighbour, features in zip(*(torch.split(part, EDGES_PER_CHUNK) for part in edges), strict=True):
             inner = start[node] + end[neighbour] + self.along(features)
             coefficients = self.of_edges(nn.functional.leaky_relu(inner, LEAKY_SLOPE, inplace=True))
             parts.append(coefficients.mul_(share[node, None]))
@@ -212,7 +182,7 @@ class StretchNetwork(nn.Module):
         features = self._features(hierarchy)
         normals = torch.from_numpy(hierarchy.normals).to(device)
         line_field = torch.zeros((len(normals), 2), device=device)
-        offsets = _OFFSET_SCALE * (self.rise(features[0])[:, :, None] * normals).sum(dim=1)
+        offsets = OFFSET_SCALE * (self.rise(features[0])[:, :, None] * normals).sum(dim=1)
         for head, level, x in zip(self.heads, hierarchy.levels, features, strict=False):
             ancestor = torch.from_numpy(level.ancestor).to(device)
             lines, vectors = head(x, level)
@@ -226,7 +196,7 @@ class StretchNetwork(nn.Module):
         skipped: list[Tensor] = []
         x: Tensor | None = None
         for k, level in enumerate(hierarchy.levels):
-            entered = self.enter[k](_INPUT_SCALE * torch.from_numpy(level.nodes).to(device))
+            entered = self.enter[k](INPUT_SCALE * torch.from_numpy(level.nodes).to(device))
             x = entered if x is None else entered + _max_pooled(x, hierarchy.levels[k - 1])
             x = self.down[k](x, level.graph)
             skipped.append(x)

@@ -7,9 +7,8 @@ from pathlib import Path
 from typing import Any
 
 from anisomesh.errors import OptionError
+from anisomesh.learn.architecture import NetworkOptions, PaperOptions
 from anisomesh.learn.inference.pretrained import configuration_path, pretrained_configurations, pretrained_networks
-from anisomesh.learn.models.paper import PaperOptions
-from anisomesh.learn.models.stretch import NetworkOptions
 from anisomesh.learn.training.losses import LOSSES
 from anisomesh.toml import check_keys, read_toml
 

@@ -18,11 +18,12 @@ from anisomesh.errors import AnisomeshError
 from anisomesh.io.atomic import atomic_path
 from anisomesh.learn.data.items import load_item
 from anisomesh.learn.data.manifest import ItemFiles
-from anisomesh.learn.models.checkpoint import WeightsError, load_state, save_state, save_weights
+from anisomesh.learn.models.checkpoint import load_state, save_state, save_weights
 from anisomesh.learn.training.config import TrainingOptions
 from anisomesh.learn.training.events import EventLog
 from anisomesh.learn.training.processes import TrainingProcess
 from anisomesh.learn.training.tasks import Task
+from anisomesh.learn.weights_file import WeightsError
 
 CHECKPOINT, WEIGHTS = "checkpoint.safetensors", "weights.safetensors"
 METRICS, EVENTS = "metrics.jsonl", "events"

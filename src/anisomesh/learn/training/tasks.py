@@ -9,10 +9,11 @@ import numpy as np
 import torch
 from torch import Tensor, nn
 
+from anisomesh.learn.architecture import NetworkOptions, PaperOptions
 from anisomesh.learn.data.examples import StretchExample, stretch_example
 from anisomesh.learn.data.items import Item
-from anisomesh.learn.models.paper import PaperInput, PaperNetwork, PaperOptions, paper_input
-from anisomesh.learn.models.stretch import NetworkOptions, Prediction, StretchNetwork
+from anisomesh.learn.models.paper import PaperInput, PaperNetwork, paper_input
+from anisomesh.learn.models.stretch import Prediction, StretchNetwork
 from anisomesh.learn.training.config import TrainingOptions
 from anisomesh.learn.training.losses import cosine_loss, dot_loss, l2_loss, laplacian_loss, line_loss, offset_loss
 from anisomesh.mesh.noise import NOISES, with_noise

@@ -11,12 +11,13 @@ import torch
 from anisomesh.errors import OptionError
 from anisomesh.learn.data.manifest import ItemFiles
 from anisomesh.learn.inference.pretrained import weights_path
-from anisomesh.learn.models.checkpoint import WeightsError, load_weights
+from anisomesh.learn.models.checkpoint import load_weights
 from anisomesh.learn.models.device import deterministic, resolve_device
 from anisomesh.learn.training.config import TrainingOptions
 from anisomesh.learn.training.processes import training_process
 from anisomesh.learn.training.run import CHECKPOINT, EpochRow, Interruption, TrainingRun
 from anisomesh.learn.training.tasks import Task, task_of
+from anisomesh.learn.weights_file import WeightsError
 
 
 def train(

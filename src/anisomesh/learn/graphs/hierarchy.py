@@ -14,7 +14,7 @@ from anisomesh._kernels.graph_hierarchy import (
     fit_normal_curvature,
     transport_to_points,
 )
-from anisomesh.learn.models.graph import CoarseningLevel, Graph, coarsen, mesh_graph
+from anisomesh.learn.graphs.graph import CoarseningLevel, Graph, coarsen, mesh_graph
 from anisomesh.mesh.geometry import sums_at_points, unit
 from anisomesh.mesh.surface import Surface
 from anisomesh.metric.tangent import replace_zero_normals, tangent_frames
