@@ -141,6 +141,7 @@ def _remesh(source: PreparedInput, n: int, options: RemeshOptions, run: Run, *, 
         seconds=run.total_seconds(),
         warnings=(
             *losses_of_repair(prepared.report),
+            *field.remarks,
             *losses_of_shape(
                 tasks.surface, Surface(mesh.points, mesh.faces), task.corner_places, made.feature_distance
             ),

@@ -10,8 +10,10 @@ import pytest
 import anisomesh
 from anisomesh.errors import OptionError
 from anisomesh.evaluation.report import evaluate
+from anisomesh.learn.architecture import NetworkOptions
 from anisomesh.learn.inference.predict import NOISE_FLOOR, predict
 from anisomesh.learn.inference.pretrained import pretrained_networks, weights_path
+from anisomesh.learn.inference.stretch import StretchInference
 from anisomesh.learn.weights_file import read_weights
 from anisomesh.mesh.noise import with_noise
 from anisomesh.mesh.surface import Surface
@@ -115,6 +117,39 @@ def test_little_noise_and_creases_stay():
     for surface in (twisted_ring(), with_noise(unit_torus(), 0.01, np.random.default_rng(0))):
         found = predict(surface.with_points(surface.points / surface.diagonal))
         assert found.noise == 0.0
+
+
+class FixedNetwork(StretchInference):
+    """A network that finds offsets of one length along the normals, when it is asked for the first time."""
+
+    def __init__(self, length):
+        self.options, self.length = NetworkOptions(scales=2, heads=1), length
+
+    def __call__(self, hierarchy):
+        normals = hierarchy.normals[:, 0] / np.linalg.norm(hierarchy.normals[:, 0], axis=1, keepdims=True)
+        offsets, self.length = self.length * normals, 0.0
+        return np.zeros((len(normals), 2), dtype=np.float32), offsets.astype(np.float32)
+
+
+@pytest.mark.parametrize(("height", "share"), [(0.049, 0), (0.0501, 0.004), (0.06, 0.4), (0.08, 1), (0.3, 1)])
+def test_the_share_of_noise_that_is_removed_grows_evenly(egg, monkeypatch, height, share):
+    """Regression: noise of 0.0500 on a clean mesh was removed in full, which inverted 204 triangles."""
+    network = FixedNetwork(height * egg.edge_lengths.mean())
+    monkeypatch.setattr("anisomesh.learn.inference.predict._network", lambda *given: network)
+    found = predict(egg)
+    moved = np.linalg.norm(found.points - egg.points, axis=1) / egg.edge_lengths.mean()
+    np.testing.assert_allclose(moved, share * height, atol=1e-6)
+    assert found.noise == pytest.approx(share * height, abs=1e-6)
+    assert found.remarks == ()
+
+
+def test_noise_beyond_what_networks_can_judge_stays_and_is_said(egg, monkeypatch):
+    """Regression: a network that had hardly been trained moved points by three mean edge lengths."""
+    network = FixedNetwork(3.1 * egg.edge_lengths.mean())
+    monkeypatch.setattr("anisomesh.learn.inference.predict._network", lambda *given: network)
+    result = anisomesh.remesh(egg, n_vertices=100, embedding="neural", max_iterations=2)
+    assert result.noise == 0.0
+    assert any("too much to judge" in sentence for sentence in result.warnings)
 
 
 def voxels(n=16):

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any, Protocol
 
 import numpy as np
@@ -40,6 +40,8 @@ class MetricField:
         Extra coordinates (V, k) that already embed the metric, None if the embedding is still to be computed.
     noise
         Root mean square height by which ``points`` differ from the surface, in mean edge lengths.
+    remarks
+        What a user should know, one sentence each.
     """
 
     tensors: PointTensors
@@ -48,6 +50,7 @@ class MetricField:
     points: Points | None = None
     extra: EmbeddedPoints | None = None
     noise: float = 0.0
+    remarks: tuple[str, ...] = ()
 
 
 class MetricSource(Protocol):
@@ -96,7 +99,9 @@ def checked_field(field: Any, surface: Surface) -> MetricField:
     if field.patch is not None:
         given = real_array("patch of the metric field", field.patch, (surface.n_faces,), MetricError)
         patch = np.unique(given, return_inverse=True)[1].astype(np.int32)
-    return MetricField(tensors=tensors, corner_tensors=corners, patch=patch, points=points, extra=extra, noise=noise)
+    if not (isinstance(field.remarks, tuple) and all(isinstance(remark, str) for remark in field.remarks)):
+        raise MetricError(f"remarks of the metric field are {field.remarks!r}; expected a tuple of sentences")
+    return replace(field, tensors=tensors, corner_tensors=corners, patch=patch, points=points, extra=extra, noise=noise)
 
 
 def mean_at_points(surface: Surface, corner_tensors: CornerTensors) -> PointTensors:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import os
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import lru_cache
 from pathlib import Path
 
@@ -21,8 +21,14 @@ from anisomesh.learn.weights_file import WeightsError, read_weights
 from anisomesh.mesh.surface import Surface
 from anisomesh.metric.line_field import tensors_of_line_field
 
-NOISE_FLOOR = 0.05
-"""In mean edge lengths: less noise is not removed. Heuristic; on clean meshes the default network finds less."""
+NOISE_FLOOR, FULL_NOISE = 0.05, 0.075
+"""In mean edge lengths: nothing is removed below the first, all above the second, in between an evenly growing share.
+
+Heuristic; on clean meshes the default network finds less than the first.
+"""
+
+MAX_NOISE = 0.8
+"""In mean edge lengths: more noise is not removed, since the network was trained with at most .5 and finds up to .7."""
 
 MAX_DENOISING_STEPS = 3
 """Largest number of times that noise is removed; heuristic."""
@@ -42,12 +48,15 @@ class Predicted:
         Removed noise: root mean square along the normals of the surface, in mean edge lengths.
     extra
         Coordinates of the embedding beyond the first three (V, 5), from the paper's network; None from the default one.
+    remarks
+        What a user should know, one sentence each.
     """
 
     tensors: PointTensors
     points: Points
     noise: float = 0.0
     extra: EmbeddedPoints | None = None
+    remarks: tuple[str, ...] = ()
 
 
 def predict(
@@ -80,7 +89,8 @@ def predict(
     Notes
     -----
     A surface on which the network finds less noise than ``NOISE_FLOOR`` is not changed. Otherwise the network is
-    applied again to the surface without the noise, at most ``MAX_DENOISING_STEPS`` times.
+    applied again to the surface without the noise, at most ``MAX_DENOISING_STEPS`` times. Up to ``FULL_NOISE`` only a
+    share of what it finds is removed. A surface with more than ``MAX_NOISE`` stays as it is.
     """
     path = weights_path(weights).resolve()
     network = _network(path, path.stat().st_mtime_ns, device)
@@ -92,17 +102,24 @@ def predict(
 
 def _predict_stretch(network: StretchInference, surface: Surface, *, denoise: bool) -> Predicted:
     """Return the metric of the surface, or of the surface without noise after up to three steps if there is some."""
-    current = surface
+    current, first = surface, 0.0
     for step in range(1 + MAX_DENOISING_STEPS):
         hierarchy = graph_hierarchy(current, network.options.scales)
         line_field, offsets = network(hierarchy)
-        if not denoise or step == MAX_DENOISING_STEPS or _rms_height(current, offsets) < NOISE_FLOOR:
+        height = _rms_height(current, offsets)
+        first = height if step == 0 else first
+        if not denoise or step == MAX_DENOISING_STEPS or height < NOISE_FLOOR:
             break
         current = current.with_points(current.points + offsets.astype(np.float64))
+    found = _rms_height(surface, current.points - surface.points)
+    if found > MAX_NOISE:
+        remark = f"the network finds noise of {found:.2g} mean edge lengths, too much to judge; nothing was removed"
+        return replace(_predict_stretch(network, surface, denoise=False), remarks=(remark,))
+    share = min((first - NOISE_FLOOR) / (FULL_NOISE - NOISE_FLOOR), 1.0) if found > 0.0 else 0.0
     return Predicted(
         tensors=tensors_of_line_field(line_field, hierarchy.frames),
-        points=current.points,
-        noise=_rms_height(surface, current.points - surface.points),
+        points=surface.points + share * (current.points - surface.points),
+        noise=share * found,
     )
 
 

@@ -62,7 +62,9 @@ class Neural:
         """
         found = predict(surface, self.weights, device=self.device, denoise=self.denoise)
         points = found.points if found.noise > 0.0 else None
-        return MetricField(tensors=found.tensors, points=points, extra=found.extra, noise=found.noise)
+        return MetricField(
+            tensors=found.tensors, points=points, extra=found.extra, noise=found.noise, remarks=found.remarks
+        )
 
 
 @dataclass(frozen=True)
@@ -84,7 +86,7 @@ class Hybrid(Neural):
         field = super().__call__(surface)
         denoised = surface if field.points is None else surface.with_points(field.points)
         blended = _blended(denoised, field.tensors, self.crease_angle)
-        return replace(blended, points=field.points, noise=field.noise)
+        return replace(blended, points=field.points, noise=field.noise, remarks=field.remarks)
 
 
 def _blended(surface: Surface, predicted: PointTensors, crease_angle: float) -> MetricField:
