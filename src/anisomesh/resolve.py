@@ -26,7 +26,7 @@ Noise turns all edges, so measured surfaces have next to none; machine parts hav
 _RESAMPLING_FACTOR = 1.5  # sharpness of the energy by which sites are sampled anew, over the sharpness; heuristic
 _NEAREST = FitOptions(price=4.0, exchange_price=0.25, rounds=5, share=0.1)  # chosen on training meshes
 _NEAREST_DECIMATION = FitOptions(price=10.0, exchange_price=2.0, rounds=3, min_quality=0.8)  # chosen on them too
-_ITERATIONS, _ITERATIONS_BEFORE_FIT = 150, 75  # of L-BFGS at most; the second from training meshes
+_ITERATIONS, _ITERATIONS_BEFORE_FIT = 150, 50  # of L-BFGS at most; the second from training meshes
 _BUILT_IN: dict[str, Callable[[float], MetricSource]] = {
     "curvature": lambda crease_angle: Curvature(crease_angle=crease_angle),
     "approximation": lambda crease_angle: Approximation(crease_angle=crease_angle),

@@ -31,14 +31,21 @@ def minimise(voronoi, sites, sharpness, on_iteration=None, **bounds):
     return lbfgs.minimise(voronoi, sites, NormalMetric(sharpness), options=options, on_iteration=on_iteration)
 
 
+@pytest.mark.parametrize("with_blocks", [False, True])
 @pytest.mark.parametrize("n_pairs", [0, 1, 2, 5])
-def test_direction_matches_the_dense_recursion(n_pairs):
+def test_direction_matches_the_dense_recursion(n_pairs, with_blocks):
     rng = np.random.default_rng(n_pairs)
-    n, d = 4, 3
+    n, d = 4, 5
     mass = rng.uniform(0.5, 2.0, n)
     root = rng.normal(size=(n * d, n * d))
     hessian = root @ root.T + np.eye(n * d)
     inverse = np.diag(np.repeat(1.0 / (2.0 * mass), d))
+    blocks = None
+    if with_blocks:
+        factors = rng.normal(size=(n, 3, 3))
+        blocks = factors @ factors.transpose(0, 2, 1) + np.eye(3)
+        for k in range(n):
+            inverse[d * k : d * k + 3, d * k : d * k + 3] = blocks[k] / (2.0 * mass[k])
     steps = rng.normal(size=(n_pairs, n * d))
     if n_pairs:
         change = hessian @ steps[-1]
@@ -51,18 +58,20 @@ def test_direction_matches_the_dense_recursion(n_pairs):
         inverse = left @ inverse @ left.T + rho * np.outer(step, step)
         pairs.append((step.reshape(n, d), change.reshape(n, d), rho))
     gradient = rng.normal(size=(n, d))
-    direction = lbfgs._direction(fake(gradient, mass), pairs)
+    direction = lbfgs._direction(fake(gradient, mass), pairs, blocks)
     np.testing.assert_allclose(direction.ravel(), -inverse @ gradient.ravel(), rtol=1e-10, atol=1e-12)
     if n_pairs:
         # secant equation: the last change of the gradient is mapped to the last step
-        last = lbfgs._direction(fake(pairs[-1][1], mass), pairs)
+        last = lbfgs._direction(fake(pairs[-1][1], mass), pairs, blocks)
         np.testing.assert_allclose(last, -pairs[-1][0], rtol=1e-9, atol=1e-10)
 
 
 def test_direction_without_pairs_is_lloyds_step():
     voronoi, sites = start()
     value = voronoi.integrate(sites, 1.0)
-    np.testing.assert_allclose(sites + lbfgs._direction(value, deque()), lloyd(voronoi, sites, 1), rtol=0, atol=1e-14)
+    np.testing.assert_allclose(
+        sites + lbfgs._direction(value, deque(), None), lloyd(voronoi, sites, 1), rtol=0, atol=1e-14
+    )
 
 
 def test_sites_with_empty_cells_stay():
@@ -185,3 +194,28 @@ def test_a_sharp_metric_attracts_sites_to_the_creases_of_a_box():
 
     plain, sharp = (minimise(voronoi, sites, sharpness=s, max_iterations=80).sites for s in (1.0, 7.0))
     assert near_crease(sharp) > near_crease(plain) + 0.1
+
+
+def test_blocks_are_the_inverses_of_the_stiffness_of_cells():
+    """In a plane it is 1 within, and the squared share of the sharpness across; elsewhere a mean over the cell."""
+    voronoi, sites = start(surface=shapes.open_patch(lambda x, y: 0.0 * x, n=9))
+    stiffness = (0.35 * 7.0) ** 2
+    np.testing.assert_allclose(NormalMetric(7.0).inverse_blocks(voronoi, sites), [np.diag([1, 1, 1 / stiffness])] * 40)
+    voronoi, sites = start(n=12)
+    diagram, surface = voronoi.diagram(sites), voronoi.embedded.surface
+    found = NormalMetric(7.0).inverse_blocks(voronoi, sites)
+    for site in range(12):
+        mine = np.flatnonzero(diagram.site == site)
+        area = diagram.fractions[mine] * surface.face_areas[diagram.facet[mine]]
+        normals = surface.face_normals[diagram.facet[mine]]
+        mean = sum(a * np.outer(v, v) for a, v in zip(area, normals, strict=True)) / area.sum()
+        np.testing.assert_allclose(found[site] @ (np.eye(3) + (stiffness - 1.0) * mean), np.eye(3), atol=1e-12)
+    assert NormalMetric(1.0).inverse_blocks(voronoi, sites) is None
+
+
+def test_blocks_lower_the_energy_faster(monkeypatch):
+    voronoi, sites = start(n=150, surface=shapes.torus(1.0, 0.4, 60, 24))
+    sites = lloyd(voronoi, sites, 5)
+    with_blocks = minimise(voronoi, sites, 7.0, max_iterations=20).energy
+    monkeypatch.setattr(NormalMetric, "inverse_blocks", lambda *given: None)
+    assert with_blocks < minimise(voronoi, sites, 7.0, max_iterations=20).energy

@@ -13,7 +13,7 @@ from anisomesh.mesh.surface import Surface
 _FIRST_SWEEPS, _ROUND_SWEEPS, _LAST_SWEEPS = 4, 2, 8  # at most
 _RISE = (1.0, 3.0, 10.0, 30.0)  # steps of a price that rises
 _MAX_ERROR_FACTOR = 1.5  # root mean squared error over the one at the start, up to which a price rises
-_MIN_SWEEP_GAIN = 5e-3  # of the energy in a sweep, below which it is the last
+_MIN_SWEEP_GAIN = 1e-2  # of the energy in a sweep, below which it is the last
 
 
 @dataclass(frozen=True, kw_only=True)
