@@ -34,19 +34,20 @@ SHAPES = {
 }
 
 
+@pytest.mark.parametrize("moves", [True, False])
 @given(
     name=st.sampled_from(sorted(SHAPES)),
     share=st.floats(0.05, 1.0),
     shake=st.floats(0.0, 0.3),
     seed=st.integers(0, 1_000),
 )
-def test_count_topology_and_held_points_are_kept(name, share, shake, seed):
+def test_count_topology_and_held_points_are_kept(moves, name, share, shake, seed):
     surface, rng = SHAPES[name](), np.random.default_rng(seed)
-    moves = rng.normal(size=surface.points.shape) * shake * surface.edge_lengths.mean()
-    surface = Surface(surface.points + moves, surface.faces)
+    away = rng.normal(size=surface.points.shape) * shake * surface.edge_lengths.mean()
+    surface = Surface(surface.points + away, surface.faces)
     held = rng.random(surface.n_points) < 0.3 * share
     n = max(int(share * surface.n_points), 20)
-    result = decimate(surface, n, held=held).surface
+    result = decimate(surface, n, held=held, moves=moves).surface
     if share > 0.5 or shake < 0.1:  # less than that may not be reached with sound triangles
         assert result.n_points == n
     assert euler_characteristic(result.faces) == euler_characteristic(surface.faces)
@@ -60,6 +61,9 @@ def test_count_topology_and_held_points_are_kept(name, share, shake, seed):
     assert result.edge_face_count.max() <= 2
     kept = {tuple(point) for point in result.points.tolist()}
     assert all(tuple(point) in kept for point in surface.points[held].tolist())
+    before = {tuple(point) for point in surface.points.tolist()}
+    assert moves or kept <= before
+    assert {tuple(point) for point in result.points[result.on_boundary].tolist()} <= before
 
 
 @pytest.mark.parametrize("name", ["sphere", "torus", "part"])

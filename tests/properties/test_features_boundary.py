@@ -19,7 +19,7 @@ from anisomesh.mesh.embedded_surface import EmbeddedSurface
 from anisomesh.mesh.surface import Surface
 from anisomesh.pipeline import remesh
 from anisomesh.shapes.analytic import open_patch, sphere
-from anisomesh.voronoi.intervals import boundary_intervals
+from anisomesh.voronoi.intervals import boundary_intervals, crease_intervals
 from anisomesh.voronoi.restricted import RestrictedVoronoi
 
 
@@ -225,3 +225,22 @@ def test_a_flat_square_keeps_its_corners_and_its_area(name):
     low, high = surface.points.min(axis=0), surface.points.max(axis=0)
     corners = np.array([[x, y, 0.0] for x in (low[0], high[0]) for y in (low[1], high[1])])
     assert np.linalg.norm(new.points[:, None] - corners[None], axis=2).min(axis=0).max() < 1e-9
+
+
+@pytest.mark.parametrize("n", [12, 60])
+def test_intervals_are_on_the_facets_of_features(n):
+    """The diagram on these alone has the same intervals as the one on the whole surface."""
+    sheet = open_patch(lambda x, y: 0.5 * np.abs(x), n=12)
+    voronoi = RestrictedVoronoi(EmbeddedSurface.in_space(sheet))
+    surface = voronoi.embedded.surface
+    features = trace_features(voronoi.embedded, n, sharp=sharp_edges(surface, 30.0))
+    sites = naive.random_sites(surface.points, surface.faces, n, np.random.default_rng(0))
+    whole, part = voronoi.diagram(sites), voronoi.diagram(sites, features.facets)
+    assert len(part.site) < 0.6 * len(whole.site)
+    for intervals in (boundary_intervals, crease_intervals):
+        wanted, found = intervals(features, whole), intervals(features, part)
+        assert len(wanted.site) > 0
+        np.testing.assert_array_equal(found.site, wanted.site)
+        np.testing.assert_allclose(found.start, wanted.start, atol=1e-12)
+        np.testing.assert_allclose(found.end, wanted.end, atol=1e-12)
+        np.testing.assert_allclose(found.place, wanted.place, atol=1e-12)

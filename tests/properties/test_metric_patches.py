@@ -20,8 +20,9 @@ from anisomesh.metric.narrow_patches import _extent, limit_to_patches
 from anisomesh.metric.patches import cut_along, smooth_patches
 from anisomesh.metric.sources import Approximation, Curvature
 from anisomesh.metric.tensors import compute_metric
-from anisomesh.metric.transfer import transfer_to_corners
+from anisomesh.metric.transfer import PlacedMetric, transfer_to_corners
 from anisomesh.shapes.analytic import box, cylinder, sphere, torus
+from anisomesh.shapes.cad_part import cad_part
 
 
 def at_unit_size(surface):
@@ -234,3 +235,17 @@ def test_a_metric_without_patches_is_not_limited():
     surface = at_unit_size(torus(1.0, 0.4, 24, 12))
     field = Curvature()(surface)
     assert limit_to_patches(field, surface, 10) is field
+
+
+def test_roots_on_faces_of_the_surface_itself_are_the_ones_at_the_closest_points():
+    part = cad_part(6)
+    field, rng = Curvature()(part), np.random.default_rng(0)
+    assert field.corner_tensors is not None
+    metric = PlacedMetric(ClosestPoints(part), field)
+    faces = rng.integers(0, part.n_faces, 500)
+    weights = rng.dirichlet(np.ones(3), 500)
+    places = np.einsum("nc,ncx->nx", weights, part.points[part.faces[faces]])
+    wanted = metric.roots(places)
+    np.testing.assert_allclose(metric.roots_on(part, faces, weights), wanted, atol=1e-9 * np.abs(wanted).max())
+    other = Surface(part.points, part.faces[::-1])
+    np.testing.assert_allclose(metric.roots_on(other, part.n_faces - 1 - faces, weights), wanted, atol=1e-12)

@@ -11,7 +11,6 @@ from .vectors import coordinates, cross, dot, length, squared_length, subtract, 
 
 _PULL = 1e-6  # towards the middle of an edge, where the planes leave the place open
 _MAX_STEP = 1.0  # edge lengths from the middle of an edge to the place of its point
-_LENGTH_WEIGHT = 1e-9  # of squared lengths beside squared distances: orders the collapses in planes; heuristic
 _WALL_WEIGHT = 3.0  # of an edge of the boundary or a crease, in squared lengths; heuristic
 _MIN_COSINE = 0.2  # between the normals of a triangle before and after a collapse; heuristic
 _MIN_THICKNESS = 1e-4  # area over squared longest side of a new triangle, unless there was a thinner one; heuristic
@@ -29,7 +28,11 @@ class Decimation(NamedTuple):
     held
         1 for points that stay (V,).
     on_line
-        1 for points of the boundary and of creases (V,), which only go along these.
+        1 for points of the boundary and of creases (V,), which only go along these, to other points there.
+    moves
+        Whether other points go to where their quadrics are lowest, and not to one of two.
+    evenness
+        Weight of squared lengths beside squared distances: short edges go first.
     face_at
         One of the faces at each point (V,).
     changed
@@ -44,6 +47,8 @@ class Decimation(NamedTuple):
     quadrics: Any
     held: Any
     on_line: Any
+    moves: Any
+    evenness: Any
     face_at: Any
     changed: Any
     heap: Any
@@ -67,17 +72,19 @@ def _place(state, p, q):
         total[k] = quadrics[p, k] + quadrics[q, k]
     start, end = coordinates(points, p), coordinates(points, q)
     along = subtract(end, start)
-    even = _LENGTH_WEIGHT * quadric_trace(total) * squared_length(along)
-    if state.held[p]:
+    even = state.evenness * quadric_trace(total) * squared_length(along)
+    if state.held[p] or (state.on_line[p] and not state.on_line[q]):
         return quadric_value(total, start) + even, start
-    if state.held[q]:
+    if state.held[q] or (state.on_line[q] and not state.on_line[p]):
         return quadric_value(total, end) + even, end
-    middle = subtract_share(start, -0.5, along)
-    step = quadric_step(total, middle, _PULL)
-    best_place, best = middle, quadric_value(total, middle)
-    if squared_length(step) <= _MAX_STEP * _MAX_STEP * squared_length(along):
-        best_place = subtract_share(middle, -1.0, step)
-        best = quadric_value(total, best_place)
+    best_place, best = start, float("inf")
+    if state.moves and not state.on_line[p]:
+        middle = subtract_share(start, -0.5, along)
+        step = quadric_step(total, middle, _PULL)
+        best_place, best = middle, quadric_value(total, middle)
+        if squared_length(step) <= _MAX_STEP * _MAX_STEP * squared_length(along):
+            best_place = subtract_share(middle, -1.0, step)
+            best = quadric_value(total, best_place)
     for k in range(2):
         place = start if k == 0 else end
         value = quadric_value(total, place)

@@ -67,7 +67,7 @@ def snap_to_features(features: FeatureNetwork, voronoi: RestrictedVoronoi, sites
     curve. A site inside moves onto a feature if its cell has an interval longer than .4 site spacings, or a crease
     corner.
     """
-    diagram = voronoi.diagram(sites.positions)
+    diagram = voronoi.diagram(sites.positions, features.facets)
     boundary = boundary_intervals(features, diagram)
     positions, on_boundary = _onto_intervals(boundary, sites.positions, sites.on_boundary, features.spacing)
     to_crease, on_crease = _onto_creases(features, diagram, sites.on_crease)

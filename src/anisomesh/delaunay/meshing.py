@@ -232,10 +232,10 @@ def _coarsened(task: MeshingTask, mesh: FeatureMesh) -> FeatureMesh:
     n, reference = task.n_vertices, task.reference
     surface, creases = Surface(mesh.points, mesh.faces), mesh.crease_edges
     if np.count_nonzero(mesh.locked | ends_of_creases(creases, surface.n_points)) <= MAX_FIXED_SHARE * n:
-        coarser = decimate(surface, n, held=mesh.locked, crease_edges=creases, reference=reference)
+        coarser = decimate(surface, n, held=mesh.locked, crease_edges=creases, moves=False, reference=reference)
         surface, creases = coarser.surface, coarser.crease_edges
     if surface.n_points > n:  # fewer than the creases need
-        coarser = decimate(surface, n, reference=reference)
+        coarser = decimate(surface, n, moves=False, reference=reference)
         surface, creases = coarser.surface, coarser.crease_edges
     none = np.zeros(surface.n_points, dtype=bool)
     return _without_inverted(task, FeatureMesh(surface.points, surface.faces, creases, none))
@@ -254,7 +254,9 @@ def _without_crossings(
         if len(points) <= n_wanted:
             break
         added = np.arange(len(points)) >= n_wanted
-        trimmed = decimate(Surface(points, faces), n_wanted, held=added, crease_edges=links, reference=reference)
+        trimmed = decimate(
+            Surface(points, faces), n_wanted, held=added, crease_edges=links, moves=False, reference=reference
+        )
         coarser = remove_self_intersections(
             trimmed.surface.points, trimmed.surface.faces, reference, max_tries=_TRIM_TRIES, deadline=task.deadline
         )

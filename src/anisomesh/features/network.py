@@ -3,8 +3,10 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
+import numpy.typing as npt
 
 from anisomesh._arrays import EdgeMask, Points
 from anisomesh.errors import OptionError
@@ -49,6 +51,12 @@ class FeatureNetwork:
     sharp: EdgeMask
     required: EdgeMask
     apexes: Ints
+
+    @cached_property
+    def facets(self) -> npt.NDArray[np.int32]:
+        """Faces of the surface (n,) with sides on the boundary or on creases, on which all intervals of cells are."""
+        sides = (self.boundary.segment_of_side >= 0) | (self.creases.segment_of_side >= 0)
+        return np.flatnonzero(sides.any(axis=1)).astype(np.int32)
 
     @property
     def any(self) -> bool:

@@ -71,25 +71,23 @@ def sample_surface(
     face = _stratified(surface.face_areas, count, rng)
     root, second = np.sqrt(rng.random(count)), rng.random(count)
     weights = np.stack([1.0 - root, root * (1.0 - second), root * second], axis=1)
-    points = np.einsum("nc,ncx->nx", weights, surface.points[surface.faces[face]])
     area = np.full(count, surface.area / count)
     edges = np.flatnonzero(creases & (surface.edge_lengths > 0.0))
     if len(edges):
         length, spacing = float(surface.edge_lengths[edges].sum()), float(np.sqrt(surface.area / count))
         n = int(min(_MAX_SIDE_SHARE * count, _CREASE_DENSITY * length / spacing)) + 1
-        edge = edges[_stratified(surface.edge_lengths[edges], n, rng)]
-        fraction = rng.random((n, 1))
-        ends = surface.points[surface.edges[edge]]
-        place = (1.0 - fraction) * ends[:, 0] + fraction * ends[:, 1]
-        points = np.concatenate([points, place, place])
-        face = np.concatenate([face, surface.edge_faces[edge, 0], surface.edge_faces[edge, 1]])
+        edge = np.tile(edges[_stratified(surface.edge_lengths[edges], n, rng)], 2)
+        side = surface.edge_faces[edge, np.repeat([0, 1], n)]
+        of_start, of_end = (surface.faces[side] == end[:, None] for end in surface.edges[edge].T)
+        fraction = np.tile(rng.random((n, 1)), (2, 1))
+        weights = np.concatenate([weights, (1.0 - fraction) * of_start + fraction * of_end])
+        face = np.concatenate([face, side])
         area = np.concatenate([area, np.full(2 * n, _CREASE_WIDTH * spacing * length / (2 * n))])
-    inside = points + _METRIC_INSET * (surface.points[surface.faces[face]].mean(axis=1) - points)
     return SurfaceSamples(
-        points=np.ascontiguousarray(points),
+        points=np.einsum("nc,ncx->nx", weights, surface.points[surface.faces[face]]),
         normals=surface.face_normals[face],
         weights=area,
-        roots=metric.roots(inside),
+        roots=metric.roots_on(surface, face, weights + _METRIC_INSET * (1.0 / 3.0 - weights)),
     )
 
 

@@ -14,6 +14,7 @@ from anisomesh.fitting.fit import FitOptions, fit_mesh
 from anisomesh.fitting.target import EdgeEnds, FitTarget
 from anisomesh.mesh.closest_points import ClosestPoints
 from anisomesh.mesh.surface import Surface
+from anisomesh.mesh.topology import with_neighbours
 from anisomesh.mesh.validity import faulty_faces
 from anisomesh.meshops.decimation import decimate
 from anisomesh.meshops.inverted import remove_inverted_triangles
@@ -86,7 +87,7 @@ def _fitted(
             return fitted
         near = _points_near(mesh, fitted, faulty)
         if task.held[near].all():
-            near = _with_neighbours(mesh, near)
+            near = with_neighbours(mesh.faces, near)
         task = replace(task, held=task.held | near, kept=task.kept | near[mesh.edges].all(axis=1))
     return None
 
@@ -103,11 +104,4 @@ def _points_near(mesh: Surface, fitted: Surface, faces: FaceLabels) -> PointMask
     places = fitted.points[np.unique(fitted.faces[faces])]
     near = np.zeros(mesh.n_points, dtype=bool)
     near[cKDTree(mesh.points).query(places)[1]] = True
-    return _with_neighbours(mesh, near)
-
-
-def _with_neighbours(mesh: Surface, chosen: PointMask) -> PointMask:
-    """Return the chosen points (V,) and all points of the faces at them."""
-    grown = np.array(chosen)
-    grown[mesh.faces[chosen[mesh.faces].any(axis=1)]] = True
-    return grown
+    return with_neighbours(mesh.faces, near)

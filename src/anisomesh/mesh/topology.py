@@ -10,7 +10,7 @@ import numpy.typing as npt
 from scipy import sparse
 from scipy.sparse import csgraph
 
-from anisomesh._arrays import EdgeIndices, Edges, FaceIndices, FaceLabels, Faces, Indices
+from anisomesh._arrays import EdgeIndices, Edges, FaceIndices, FaceLabels, Faces, Indices, PointMask
 
 
 def half_edges(faces: Faces) -> npt.NDArray[np.int32]:
@@ -190,3 +190,10 @@ def graph_components(links: npt.NDArray[np.integer], size: int) -> tuple[int, np
     graph = sparse.coo_matrix((weights, (links[:, 0], links[:, 1])), shape=(size, size))
     count, labels = csgraph.connected_components(graph, directed=False)
     return int(count), labels.astype(np.int32)
+
+
+def with_neighbours(faces: Faces, chosen: PointMask) -> PointMask:
+    """Return the chosen points (V,) and all points of the faces (F, 3) at them."""
+    grown = np.array(chosen)
+    grown[faces[chosen[faces].any(axis=1)]] = True
+    return grown

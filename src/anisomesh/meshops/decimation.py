@@ -8,18 +8,19 @@ import numpy as np
 import numpy.typing as npt
 from scipy.spatial import cKDTree
 
-from anisomesh._arrays import PointMask
+from anisomesh._arrays import FaceMask, PointMask
 from anisomesh._kernels import decimate as kernels
 from anisomesh._kernels.heap import EdgeHeap
 from anisomesh._kernels.stars import Stars
 from anisomesh.mesh.closest_points import ClosestPoints
 from anisomesh.mesh.marked_surface import MarkedSurface
 from anisomesh.mesh.surface import Surface
-from anisomesh.mesh.topology import edge_keys
+from anisomesh.mesh.topology import edge_keys, with_neighbours
 from anisomesh.mesh.validity import inverted_faces
 
 _STAR_ROOM = 4_096  # faces around a point; a point with more, as in the middle of a fan, stays
 _MAX_REPEATS = 4  # with points held where triangles were inverted
+_LEAST_EVENNESS, _EVENNESS = 1e-9, 1e-3  # weight of squared lengths where points move, and where not; heuristic
 _HEAP_ROOM = 12  # entries for each point, half of which are all edges at the start
 
 EdgeEnds = npt.NDArray[np.int64]
@@ -47,6 +48,7 @@ def decimate(
     *,
     held: PointMask | None = None,
     crease_edges: EdgeEnds | None = None,
+    moves: bool = True,
     reference: ClosestPoints | None = None,
 ) -> Decimated:
     """Collapse edges, the cheapest first, until a number of points is left or none can go.
@@ -61,16 +63,20 @@ def decimate(
         Points (V,) that stay.
     crease_edges
         Ends of edges along creases (n, 2): points on them only go along them, and stay where they end or meet.
+    moves
+        Whether new points may be anywhere; if not, they are points of the surface, and short edges go first where
+        distances are small: the mesh has good triangles that are to stay so.
     reference
-        A surface against which no more triangles are to be inverted than there are.
+        A surface against which few triangles are to be inverted.
 
     Notes
     -----
     Edges are collapsed in the order of their quadrics, sums of squared distances to the planes of the faces and, at
-    the boundary and creases, to walls on the edges; the new point is where these are lowest. A collapse is made if it
-    fulfils the link condition, tilts no triangle by more than 78 degrees, and makes none thin. So topology,
-    orientation and boundary loops stay, but triangles may intersect each other. Where some are inverted against the
-    reference, the points there are held, and all is done again, at most four times.
+    the boundary and creases, to walls on the edges. The new point is where these are lowest; without moves, and on the
+    boundary and on creases, it is one of the two before. A collapse is made if it fulfils the link condition, tilts no
+    triangle by more than 78 degrees, and makes none thin. So topology, orientation and boundary loops stay, but
+    triangles may intersect each other. Where some are inverted against the reference, the points there are held, more
+    each time, and all is done again, at most four times and as long as the number of points is reached.
 
     References
     ----------
@@ -79,26 +85,37 @@ def decimate(
     """
     creases = np.zeros((0, 2), dtype=np.int64) if crease_edges is None else crease_edges
     stays = np.zeros(surface.n_points, dtype=bool) if held is None else np.array(held)
-    result = _collapsed(surface, n_points, stays, creases)
+    best = result = _collapsed(surface, n_points, stays, creases, moves=moves)
     if reference is None:
-        return result
-    n_before = np.count_nonzero(inverted_faces(surface, reference))
-    for _ in range(_MAX_REPEATS):
-        inverted = inverted_faces(result.surface, reference)
-        if np.count_nonzero(inverted) <= n_before:
+        return best
+    least = np.count_nonzero(inverted_faces(surface, reference))
+    inverted = fewest = inverted_faces(result.surface, reference)
+    for repeat in range(_MAX_REPEATS):
+        if np.count_nonzero(fewest) <= least or result.surface.n_points > best.surface.n_points:
             break
-        places = result.surface.points[np.unique(result.surface.faces[inverted])]
-        stays[cKDTree(surface.points).query(places)[1]] = True
-        result = _collapsed(surface, n_points, stays, creases)
-    return result
+        stays |= _points_near(surface, result.surface, inverted, rings=repeat)
+        result = _collapsed(surface, n_points, stays, creases, moves=moves)
+        inverted = inverted_faces(result.surface, reference)
+        if result.surface.n_points <= best.surface.n_points and inverted.sum() < fewest.sum():
+            best, fewest = result, inverted
+    return best
 
 
-def _collapsed(surface: Surface, n_points: int, held: PointMask, creases: EdgeEnds) -> Decimated:
+def _points_near(surface: Surface, result: Surface, faces: FaceMask, *, rings: int) -> PointMask:
+    """Return the points of a surface (V,) nearest to corners of faces (F,) of the result, and rings of neighbours."""
+    near = np.zeros(surface.n_points, dtype=bool)
+    near[cKDTree(surface.points).query(result.points[np.unique(result.faces[faces])])[1]] = True
+    for _ in range(rings):
+        near = with_neighbours(surface.faces, near)
+    return near
+
+
+def _collapsed(surface: Surface, n_points: int, held: PointMask, creases: EdgeEnds, *, moves: bool) -> Decimated:
     """Return a surface with edges collapsed until a number of points is left or none can go."""
     surplus = surface.n_points - n_points
     if surplus <= 0:
         return Decimated(surface=surface, crease_edges=creases)
-    state = _arrays(surface, held, creases)
+    state = _arrays(surface, held, creases, moves=moves)
     kernels.set_quadrics(state)
     kernels.decimate(state, surplus)
     alive = state.mesh.faces[:, 0] >= 0
@@ -114,7 +131,7 @@ def ends_of_creases(crease_edges: EdgeEnds, n_points: int) -> PointMask:
     return np.asarray((count != 0) & (count != 2))
 
 
-def _arrays(surface: Surface, held: PointMask, creases: EdgeEnds) -> kernels.Decimation:
+def _arrays(surface: Surface, held: PointMask, creases: EdgeEnds, *, moves: bool) -> kernels.Decimation:
     """Return the arrays that the kernels work on."""
     n = surface.n_points
     labels = np.isin(edge_keys(surface.edges), edge_keys(creases)).astype(np.int32)
@@ -129,6 +146,8 @@ def _arrays(surface: Surface, held: PointMask, creases: EdgeEnds) -> kernels.Dec
         quadrics=np.zeros((n + 1, 10)),
         held=(ends_of_creases(creases, n) | held).astype(np.uint8),
         on_line=on_line.astype(np.uint8),
+        moves=moves,
+        evenness=_LEAST_EVENNESS if moves else _EVENNESS,
         face_at=face_at,
         changed=np.zeros(n, dtype=np.int64),
         heap=EdgeHeap(np.empty(size), np.empty((size, 2), dtype=np.int32), np.empty(size, dtype=np.int64)),

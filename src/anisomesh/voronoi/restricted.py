@@ -130,8 +130,16 @@ class RestrictedVoronoi:
             integrate.gather(touched, accumulated, gradient, mass, energy)
         return EnergyValue(value=float(energy.sum()), gradient=gradient, mass=mass, per_cell=energy)
 
-    def diagram(self, sites: Sites) -> Diagram:
-        """Return the diagram in symbolic form: polygons, their vertices and what bounds each edge."""
+    def diagram(self, sites: Sites, facets: Chunk | None = None) -> Diagram:
+        """Return the diagram in symbolic form: polygons, their vertices and what bounds each edge.
+
+        Parameters
+        ----------
+        sites
+            Positions (S, d).
+        facets
+            The facets (n,) to which the diagram is restricted; all of the surface by default.
+        """
 
         def write_chunk(chunk: Chunk, buffers: _Buffers) -> tuple[DiagramPart, Problems]:
             n, n_vertices, n_problems = diagram.count_chunk(
@@ -144,7 +152,7 @@ class RestrictedVoronoi:
             return part, problems
 
         sites = self._prepare(sites, exact=True)
-        return assemble(self.embedded, np.array(sites), self._run(write_chunk, sites))
+        return assemble(self.embedded, np.array(sites), self._run(write_chunk, sites, facets))
 
     def _prepare(self, sites: Sites, *, exact: bool = False) -> Sites:
         # kernels are compiled anew for other types, orders and read-only arrays
@@ -165,9 +173,12 @@ class RestrictedVoronoi:
     def _new_buffers(self, sites: Sites) -> _Buffers:
         return _Buffers(len(sites), sites.shape[1], self._size, self._chunk)
 
-    def _run(self, work: Callable[[Chunk, _Buffers], tuple[_T, Problems]], sites: Sites) -> list[_T]:
-        """Run the work on all facets by chunks, and again on the facets with problems once their cause is removed."""
-        facets = np.arange(self.embedded.surface.n_faces, dtype=np.int32)
+    def _run(
+        self, work: Callable[[Chunk, _Buffers], tuple[_T, Problems]], sites: Sites, facets: Chunk | None = None
+    ) -> list[_T]:
+        """Run the work on facets by chunks, and again on the facets with problems once their cause is removed."""
+        if facets is None:
+            facets = np.arange(self.embedded.surface.n_faces, dtype=np.int32)
         parts: list[_T] = []
         for _ in range(_MAX_REPAIR_ROUNDS):
             chunks = np.split(facets, np.arange(self._chunk, len(facets), self._chunk))

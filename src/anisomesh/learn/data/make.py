@@ -160,7 +160,7 @@ def _random_variants(
     for kind in recipe.variants:
         if kind == "decimated":
             n = round(rng.uniform(*_DECIMATED_RANGE) * clean.n_points)
-            variants[kind] = decimate(clean, n).surface
+            variants[kind] = decimate(clean, n, moves=False).surface
         elif kind == "stretched":
             n = round(rng.uniform(*_STRETCHED_RANGE) * clean.n_points)
             variants[kind] = with_random_triangles(clean, n, rng, remesher)
