@@ -18,7 +18,7 @@ if TYPE_CHECKING:  # the command line imports this module, and has to start at o
     from anisomesh.embedding.embedder import Embedder
     from anisomesh.metric.field import MetricSource
 
-EmbeddingName = Literal["auto", "direct", "neural", "hybrid"]
+EmbeddingName = Literal["auto", "direct", "filtered", "neural", "hybrid"]
 DeviceName = Literal["cpu", "cuda"]
 MAX_THREADS = 1024
 MIN_VERTICES = 4  # a tetrahedron
@@ -46,10 +46,11 @@ class RemeshOptions:
         ``"curvature"``, ``"approximation"``, ``"uniform"``; tensors (V, 3, 3) at the points of the input, in model
         units; or a :class:`~anisomesh.metric.field.MetricSource`, such as ``Curvature()`` or ``Neural("file")``.
     embedding
-        ``"direct"``: the metric is measured; ``"neural"``: short for ``metric=Neural(weights, device, denoise)``;
-        ``"hybrid"``: the same for ``Hybrid``, a mean of both; ``"auto"``: hybrid where the metric is
-        ``"curvature"``, the only one that networks predict, and fewer than a tenth of the edges of the input
-        are flat, as on measured surfaces; else direct. Or an
+        ``"direct"``: the metric is measured; ``"filtered"``: the same after filters have removed noise;
+        ``"neural"``: short for ``metric=Neural(weights, device, denoise)``; ``"hybrid"``: the same for ``Hybrid``, a
+        mean of measured and predicted metric; ``"auto"``: hybrid where the metric is ``"curvature"``, the only one that
+        networks predict, and fewer than a tenth of the edges of the input are flat, as on measured surfaces; else
+        direct. Or an
         :class:`~anisomesh.embedding.embedder.Embedder`, such as ``Direct(iterations=20)``.
     energy
         The energy that the sites minimise, an :class:`~anisomesh.cvt.energy.Energy`; by default
@@ -167,11 +168,15 @@ class RemeshOptions:
                 raise OptionError("sharpness belongs to the built-in energy; give it to NormalMetric or leave it out")
             if self.final_sharpness is not None:
                 raise OptionError("final_sharpness ends with the built-in energy in place of yours; leave one out")
-        if self.embedding == "direct" and self.weights is not None:
-            raise OptionError("weights belong to a network, and embedding 'direct' has none; use 'neural' or 'hybrid'")
-        network = self.embedding in ("neural", "hybrid") or self.weights is not None
-        if network and not (isinstance(self.metric, str) and self.metric == "curvature"):
+        if self.embedding in ("direct", "filtered") and self.weights is not None:
+            raise OptionError(
+                f"weights belong to a network, and embedding {self.embedding!r} has none; use 'neural' or 'hybrid'"
+            )
+        curvature = isinstance(self.metric, str) and self.metric == "curvature"
+        if (self.embedding in ("neural", "hybrid") or self.weights is not None) and not curvature:
             raise OptionError("a network (embedding, weights) predicts the curvature metric and no other")
+        if self.embedding == "filtered" and not curvature:
+            raise OptionError("embedding 'filtered' measures the curvature metric and no other")
 
 
 def with_overrides(options: Any, overrides: dict[str, Any]) -> RemeshOptions:

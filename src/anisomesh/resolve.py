@@ -8,6 +8,7 @@ from dataclasses import replace
 from anisomesh._arrays import PointTensors
 from anisomesh.cvt.energy import Energy, NormalMetric
 from anisomesh.cvt.schedule import CVTOptions
+from anisomesh.denoise.source import Filtered
 from anisomesh.embedding.embedder import Direct, Embedder
 from anisomesh.features.detect import share_of_flat_edges
 from anisomesh.fitting.fit import FitOptions, FitPlan
@@ -32,17 +33,23 @@ _BUILT_IN: dict[str, Callable[[float], MetricSource]] = {
     "approximation": lambda crease_angle: Approximation(crease_angle=crease_angle),
     "uniform": lambda crease_angle: Uniform(),
 }
+_NAMES_OF_SOURCES: dict[type, str] = {
+    Hybrid: "hybrid",
+    Neural: "neural",
+    Filtered: "filtered",
+    **dict.fromkeys((Curvature, Approximation, Uniform), "direct"),
+}
 
 
 def embedding_name(options: RemeshOptions) -> str:
-    """Return ``"direct"``, ``"neural"`` or ``"hybrid"``, or the name of a metric source of the user.
+    """Return ``"direct"``, ``"filtered"``, ``"neural"`` or ``"hybrid"``, or the name of a metric source of the user.
 
     ``"auto"`` is what it is for a measured surface.
     """
     metric, embedding = options.metric, options.embedding
     if callable(metric):
-        known = {Hybrid: "hybrid", Neural: "neural", Curvature: "direct", Approximation: "direct", Uniform: "direct"}
-        return known.get(type(metric)) or str(getattr(metric, "__name__", type(metric).__name__))
+        name = str(getattr(metric, "__name__", type(metric).__name__))
+        return _NAMES_OF_SOURCES.get(type(metric), name)
     if not isinstance(embedding, str):
         return "direct"
     if embedding != "auto":
@@ -86,11 +93,13 @@ def metric_source(options: RemeshOptions, surface: Surface, tensors: PointTensor
         if name in ("neural", "hybrid"):
             given = (options.weights, options.device, options.denoise)
             metric = Hybrid(*given, options.feature_angle) if name == "hybrid" else Neural(*given)
+        elif name == "filtered":
+            metric = Filtered(options.denoise, options.feature_angle)
         elif tensors is not None:
             return PrecomputedTensors(tensors)
         else:
             return _BUILT_IN[str(metric)](options.feature_angle)
-    if isinstance(metric, Neural):
+    if isinstance(metric, Neural | Filtered):
         denoise = metric.denoise and options.denoise and not is_designed(surface)
         return replace(metric, denoise=denoise)
     return metric

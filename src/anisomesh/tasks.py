@@ -65,18 +65,7 @@ class Tasks:
 def set_up(source: PreparedInput, n: int, options: RemeshOptions, run: Run, *, nearest: bool) -> Tasks:
     """Return the tasks to remesh a prepared surface with n vertices.
 
-    Parameters
-    ----------
-    source
-        The prepared input.
-    n
-        Vertices asked for.
-    options
-        How to remesh.
-    run
-        Is told about the stages.
-    nearest
-        Whether the distance counts more than the shape.
+    ``nearest`` if the distance counts more than the shape.
     """
     prepared = source.prepared
     with run.stage("prepare"):

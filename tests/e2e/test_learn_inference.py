@@ -85,11 +85,13 @@ def test_noise_is_removed(size):
     found = predict(noisy)
     assert found.noise == pytest.approx(size, rel=0.4)
     measured = {}
-    for name in ("direct", "hybrid"):
+    for name in ("direct", "filtered", "hybrid"):
         result = anisomesh.remesh(noisy, n_vertices=400, embedding=name)
         measured[name] = evaluate(clean, result.surface, samples=20_000)
-    assert measured["hybrid"].shape.g_mean > measured["direct"].shape.g_mean + 0.02
-    assert measured["hybrid"].distance.rms < measured["direct"].distance.rms
+        assert (result.noise > 0.0) == (name != "direct")
+    for name in ("filtered", "hybrid"):
+        assert measured[name].shape.g_mean > measured["direct"].shape.g_mean + 0.02
+        assert measured[name].distance.rms < measured["direct"].distance.rms
 
 
 @pytest.mark.slow
@@ -135,6 +137,7 @@ class FixedNetwork(StretchInference):
 def test_the_share_of_noise_that_is_removed_grows_evenly(egg, monkeypatch, height, share):
     """Regression: noise of 0.0500 on a clean mesh was removed in full, which inverted 204 triangles."""
     network = FixedNetwork(height * egg.edge_lengths.mean())
+    monkeypatch.setattr("anisomesh.learn.inference.predict.bilateral_filtered", lambda surface, **given: surface)
     monkeypatch.setattr("anisomesh.learn.inference.predict._network", lambda *given: network)
     found = predict(egg)
     moved = np.linalg.norm(found.points - egg.points, axis=1) / egg.edge_lengths.mean()
@@ -215,6 +218,8 @@ def test_missing_weights_and_devices_are_refused(egg, tmp_path):
         ({"embedding": "direct", "weights": "default"}, OptionError, "embedding 'direct' has none"),
         ({"embedding": "neural", "device": "tpu"}, OptionError, "expected one of cpu, cuda"),
         ({"embedding": "hybrid", "metric": "uniform"}, OptionError, "and no other"),
+        ({"embedding": "filtered", "metric": "uniform"}, OptionError, "and no other"),
+        ({"embedding": "filtered", "weights": "default"}, OptionError, "has none"),
     ):
         with pytest.raises(kind, match=message):
             anisomesh.remesh(egg, n_vertices=100, **words)

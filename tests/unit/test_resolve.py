@@ -1,5 +1,6 @@
 """What the embedding ``"auto"`` stands for."""
 
+from anisomesh.denoise.source import Filtered
 from anisomesh.metric.sources import Uniform
 from anisomesh.options import RemeshOptions
 from anisomesh.resolve import embedding_name, is_designed, with_embedding_chosen
@@ -23,3 +24,5 @@ def test_what_was_asked_for_is_done():
     assert chosen(sphere(2), embedding="direct") == "direct"
     assert chosen(sphere(2), metric="approximation") == "direct"
     assert chosen(sphere(2), metric=Uniform()) == "direct"
+    assert chosen(sphere(2), embedding="filtered") == "filtered"
+    assert chosen(sphere(2), metric=Filtered()) == "filtered"

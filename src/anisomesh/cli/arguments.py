@@ -69,8 +69,9 @@ REMESH_OPTIONS: dict[str, Any] = {
     "embedding": Annotated[
         EmbeddingName,
         _option(
-            help="Source of the metric. direct: measured curvature; neural: a network; hybrid: the mean of both; auto: "
-            "hybrid if the metric is curvature and the input is not a designed part, else direct."
+            help="Source of the metric. direct: measured curvature; filtered: the same after filters have removed "
+            "noise; neural: a network; hybrid: the mean of measured and predicted curvature; auto: hybrid if the "
+            "metric is curvature and the input is not a designed part, else direct."
         ),
     ],
     "weights": Annotated[

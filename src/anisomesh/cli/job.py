@@ -181,7 +181,7 @@ def run_remesh(
         "remesh",
         *(["fit"] if source.fit else []),
         *(["decimate"] if source.fit and nearest else []),
-        *(["network"] if embedding_name(source) != "direct" else []),
+        *(["network"] if embedding_name(source) in ("neural", "hybrid") else []),
     ]
     announce_compilation(display, *works)
     result = remesh(surface, on_step=display, **options)

@@ -1,4 +1,4 @@
-"""Synthetic noise on the points of a surface, for training, tests and benchmarks."""
+"""Noise on the points of a surface: synthetic noise for training, tests and benchmarks, and how high noise is."""
 
 from __future__ import annotations
 
@@ -6,6 +6,7 @@ from typing import Literal
 
 import numpy as np
 
+from anisomesh._arrays import PointVectors
 from anisomesh.mesh.surface import Surface
 
 Noise = Literal["independent", "normal", "smooth"]
@@ -39,3 +40,9 @@ def with_noise(surface: Surface, noise: float, rng: np.random.Generator, kind: N
         count = np.bincount(ends[:, 0], minlength=len(offsets))[:, None]
         offsets = (offsets + sums) / (2.0 * np.sqrt(count + 1.0))
     return surface.with_points(surface.points + offsets)
+
+
+def noise_height(surface: Surface, offsets: PointVectors) -> float:
+    """Return the root mean square of offsets (V, 3) along the normals of a surface, in mean edge lengths."""
+    heights = np.einsum("nx,nx->n", surface.point_normals, offsets)
+    return float(np.sqrt((heights**2).mean()) / surface.edge_lengths.mean())

@@ -10,6 +10,7 @@ from pathlib import Path
 import numpy as np
 
 from anisomesh._arrays import EmbeddedPoints, Points, PointTensors
+from anisomesh.denoise.filters import bilateral_filtered
 from anisomesh.embedding.precomputed import pulled_back_metric
 from anisomesh.learn import require_torch
 from anisomesh.learn.architecture import PaperOptions
@@ -18,6 +19,7 @@ from anisomesh.learn.inference.paper import PaperInference
 from anisomesh.learn.inference.pretrained import weights_path
 from anisomesh.learn.inference.stretch import StretchInference
 from anisomesh.learn.weights_file import WeightsError, read_weights
+from anisomesh.mesh.noise import noise_height
 from anisomesh.mesh.surface import Surface
 from anisomesh.metric.line_field import tensors_of_line_field
 
@@ -32,6 +34,8 @@ MAX_NOISE = 0.8
 
 MAX_DENOISING_STEPS = 3
 """Largest number of times that noise is removed; heuristic."""
+
+_FILTER_ROUNDS, _NORMAL_WIDTH = 3, 0.25  # of the bilateral filter after the network; heuristic
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -89,8 +93,9 @@ def predict(
     Notes
     -----
     A surface on which the network finds less noise than ``NOISE_FLOOR`` is not changed. Otherwise the network is
-    applied again to the surface without the noise, at most ``MAX_DENOISING_STEPS`` times. Up to ``FULL_NOISE`` only a
-    share of what it finds is removed. A surface with more than ``MAX_NOISE`` stays as it is.
+    applied again to the surface without the noise, at most ``MAX_DENOISING_STEPS`` times. Then a bilateral filter of
+    the normals removes what is left, better than the network alone. Up to ``FULL_NOISE`` only a share is removed. A
+    surface with more than ``MAX_NOISE`` stays as it is.
     """
     path = weights_path(weights).resolve()
     network = _network(path, path.stat().st_mtime_ns, device)
@@ -106,12 +111,14 @@ def _predict_stretch(network: StretchInference, surface: Surface, *, denoise: bo
     for step in range(1 + MAX_DENOISING_STEPS):
         hierarchy = graph_hierarchy(current, network.options.scales)
         line_field, offsets = network(hierarchy)
-        height = _rms_height(current, offsets)
+        height = noise_height(current, offsets)
         first = height if step == 0 else first
         if not denoise or step == MAX_DENOISING_STEPS or height < NOISE_FLOOR:
             break
         current = current.with_points(current.points + offsets.astype(np.float64))
-    found = _rms_height(surface, current.points - surface.points)
+    if current is not surface:
+        current = bilateral_filtered(current, rounds=_FILTER_ROUNDS, normal_width=_NORMAL_WIDTH)
+    found = noise_height(surface, current.points - surface.points)
     if found > MAX_NOISE:
         remark = f"the network finds noise of {found:.2g} mean edge lengths, too much to judge; nothing was removed"
         return replace(_predict_stretch(network, surface, denoise=False), remarks=(remark,))
@@ -121,12 +128,6 @@ def _predict_stretch(network: StretchInference, surface: Surface, *, denoise: bo
         points=surface.points + share * (current.points - surface.points),
         noise=share * found,
     )
-
-
-def _rms_height(surface: Surface, offsets: Points) -> float:
-    """Return the root mean square of the offsets (V, 3) along the normals, in mean edge lengths."""
-    heights = np.einsum("nx,nx->n", surface.point_normals, offsets)
-    return float(np.sqrt((heights**2).mean()) / surface.edge_lengths.mean())
 
 
 @lru_cache(maxsize=4)

@@ -1,0 +1,1 @@
+"""Removal of noise by filters, without a network."""
