@@ -30,7 +30,7 @@ Heuristic; on clean meshes the default network finds less than the first.
 """
 
 MAX_NOISE = 0.8
-"""In mean edge lengths: more noise is not removed, since the network was trained with at most .5 and finds up to .7."""
+"""In mean edge lengths: more noise is not removed, since the default network was trained with at most .6. Heuristic."""
 
 MAX_DENOISING_STEPS = 3
 """Largest number of times that noise is removed; heuristic."""
