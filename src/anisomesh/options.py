@@ -76,7 +76,7 @@ class RemeshOptions:
     threads
         Worker threads; they do not change the result.
     lloyd_iterations, max_iterations
-        Iterations of Lloyd's algorithm at the start, and the bound on iterations of L-BFGS after it; by default 75 if
+        Iterations of Lloyd's algorithm at the start, and the bound on iterations of L-BFGS after it; by default 50 if
         the mesh is fitted, which makes more of them useless, and else 150.
     embedding_iterations
         Bound on the local/global steps of the direct embedding.

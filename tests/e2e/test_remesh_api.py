@@ -197,7 +197,7 @@ def test_an_exception_in_the_callback_ends_the_work(ring):
         ({"ratio": float("nan")}, "positive number"),
         ({"n_vertices": 100, "sharpness": 0.5}, "at least 1"),
         ({"n_vertices": 100, "metric": "fancy"}, "expected one of curvature"),
-        ({"n_vertices": 100, "embedding": "magic"}, "expected one of auto, direct, neural, hybrid"),
+        ({"n_vertices": 100, "embedding": "magic"}, "expected one of auto, direct, filtered, neural, hybrid"),
         ({"n_vertices": 100, "threads": 0}, "at least 1"),
         ({"n_vertices": 100, "feature_angle": 200.0}, "0 to 180"),
         ({"n_vertices": 100, "sharpnes": 7}, "no option 'sharpnes'"),
