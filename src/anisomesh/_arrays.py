@@ -9,11 +9,12 @@ from typing import Any
 
 import numpy as np
 import numpy.typing as npt
-from jaxtyping import Bool, Float64, Int32
+from jaxtyping import Bool, Float64, Int32, Int64
 
 Points = Float64[np.ndarray, "V 3"]
 Faces = Int32[np.ndarray, "F 3"]
 Edges = Int32[np.ndarray, "E 2"]
+EdgeEnds = Int64[np.ndarray, "n 2"]
 FaceIndices = Int32[np.ndarray, "F 3"]
 EdgeIndices = Int32[np.ndarray, "E 2"]
 

@@ -64,8 +64,9 @@ def caveats(
 ) -> Iterator[str]:
     """Yield one sentence for everything that a user should know about a result of n vertices asked for."""
     n_points = len(mesh.points)
-    if options.device != "cpu" and embedding_name(options) == "direct":
-        yield f"the device {options.device!r} was not used, since the direct embedding uses no network"
+    name = embedding_name(options)
+    if options.device != "cpu" and name in ("direct", "filtered"):
+        yield f"the device {options.device!r} was not used, since the {name} embedding uses no network"
     if noise > 0.0:
         yield f"noise of {noise:.2f} mean edge lengths was removed first; the result follows the denoised surface"
     if optimised.status is Status.TIME_LIMIT:

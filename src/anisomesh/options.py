@@ -64,8 +64,8 @@ class RemeshOptions:
     device
         Where the network runs, ``"cpu"``, or ``"cuda"``, which needs torch.
     denoise
-        Whether noise that a network finds in the input is removed first. Designed surfaces, on which a tenth of the
-        edges or more are flat, are left as they are.
+        Whether noise that a network or filters find in the input is removed first. Designed surfaces, on which a tenth
+        of the edges or more are flat, are left as they are.
     fit
         Whether the mesh is fitted to the input at the end: vertices move and edges are flipped such that distance and
         shape of the triangles get better together. Without it the result is the dual of the tessellation, as in the

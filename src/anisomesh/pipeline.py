@@ -202,7 +202,7 @@ def _mesh_of_start(task: MeshingTask, target: FitTarget | None, options: RemeshO
         )
         if target is not None:
             surface = fit_without_faults(surface, target, crease_edges=mesh.crease_edges, deadline=run.deadline)
-            mesh = replace(mesh, points=surface.points, faces=surface.faces)
+            mesh = replace(mesh, points=surface.points, faces=surface.faces, crease_edges=mesh.crease_edges[:0])
         validity = check_validity(surface, task.surface)
     return _Made(
         mesh=mesh, optimised=optimised, validity=validity, feature_distance=feature_distance, seed=options.seed

@@ -40,7 +40,7 @@ class RemeshResult:
     corner_tensors
         The metric at the corners of the faces of ``working`` (F, 3, 3, 3) where it jumps across creases, else None.
     embedding_name
-        ``"direct"``, ``"neural"`` or ``"hybrid"``, or the name of a metric source of the user.
+        ``"direct"``, ``"filtered"``, ``"neural"`` or ``"hybrid"``, or the name of a metric source of the user.
     noise
         Root mean square height of the noise that was removed from the input, in mean edge lengths of ``working``.
     frame

@@ -61,11 +61,11 @@ def smallest_within(
     def error_at(n: int) -> float:
         result = remesh(n)
         error = hausdorff_distance(surface, result.surface, DISTANCE_SAMPLES)
-        error = min(max(error, result.feature_distance), surface.diagonal)
-        if error <= max_error:
+        lost = min(result.feature_distance, surface.diagonal)
+        if max(error, lost) <= max_error:
             results.clear()
             results[n] = replace(result, distance=error)  # only the last sufficient result is kept
-        return error
+        return max(error, lost)
 
     counts = Counts(
         first=max(MIN_VERTICES, round(FIRST_RATIO * surface.n_points)),

@@ -378,7 +378,7 @@ def test_networks_run_without_torch_and_the_error_of_a_gpu_names_the_extra(torus
         "import sys; sys.modules['torch'] = sys.modules['safetensors'] = None\n"
         "import anisomesh; from anisomesh.errors import AnisomeshError\n"
         f"s = anisomesh.load({str(torus_obj)!r})\n"
-        "result = anisomesh.remesh(s, n_vertices=50, max_iterations=2)\n"
+        "result = anisomesh.remesh(s, n_vertices=50, embedding='hybrid', max_iterations=2)\n"
         "print(result.surface.n_points, result.embedding_name)\n"
         "try: anisomesh.remesh(s, n_vertices=50, embedding='neural', device='cuda')\n"
         "except AnisomeshError as error: print(error)\n"

@@ -278,3 +278,26 @@ def test_no_triangle_is_inverted_against_the_reference(n):
     assert not inverted_faces(result, reference).any()
     assert result.n_points == n
     assert n > 150 or inverted_faces(free, reference).any()
+
+
+@given(seed=st.integers(0, 1_000), share=st.floats(0.1, 0.9))
+def test_creases_on_an_open_surface_keep_its_topology(seed, share):
+    """Regression: the crease edge between two points of the boundary was collapsed, which pinched the sheet."""
+    rng = np.random.default_rng(seed)
+    sheet = shapes.open_patch(lambda x, y: 0.2 * x * y, n=6)
+    chosen = sheet.edges[rng.random(len(sheet.edges)) < 0.3].astype(np.int64)
+    result = decimate(sheet, int(share * sheet.n_points), crease_edges=chosen).surface
+    assert len(nonmanifold_points(result.faces)) == 0
+    assert len(boundary_loops(result.faces)) == 1
+    assert euler_characteristic(result.faces) == 1
+
+
+def test_an_edge_across_a_strip_stays():
+    """Regression: it fulfils the link condition, but both its ends are on the boundary."""
+    points = np.array([[k, side, 0.0] for k in range(6) for side in (0.0, 1.0)])
+    faces = np.array([face for k in range(0, 10, 2) for face in ([k, k + 2, k + 1], [k + 1, k + 2, k + 3])])
+    strip = Surface(points, faces)
+    across = np.array([[k, k + 1] for k in range(2, 10, 2)])
+    result = decimate(strip, 3, crease_edges=across).surface
+    assert len(nonmanifold_points(result.faces)) == 0
+    assert len(boundary_loops(result.faces)) == 1

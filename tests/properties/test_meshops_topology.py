@@ -5,6 +5,7 @@ import pytest
 
 from anisomesh.mesh.closest_points import ClosestPoints
 from anisomesh.mesh.surface import Surface
+from anisomesh.mesh.topology import edge_keys
 from anisomesh.mesh.validity import check_validity, inverted_faces
 from anisomesh.meshops.collapse import collapsible_edges
 from anisomesh.meshops.decimation import decimate
@@ -100,3 +101,14 @@ def test_splits_reach_the_number_on_the_surface_and_keep_topology_and_side(name)
     inner = np.arange(len(points), n)[~result.on_boundary[len(points) :]]
     assert np.sqrt(reference.squared_distances(grown[inner])).max() < 1e-9
     assert split_longest_edges(points, faces, len(points), reference, roots)[0] is points
+
+
+def test_splits_leave_edges_that_are_kept():
+    surface = SHAPES["part"]
+    longest = surface.edges[np.argsort(-surface.edge_lengths)[:50]].astype(np.int64)
+    roots = np.tile(np.eye(3), (surface.n_points, 1, 1))
+    grown = split_longest_edges(
+        surface.points, surface.faces, surface.n_points + 30, ClosestPoints(surface), roots, kept=longest
+    )
+    assert len(grown[0]) == surface.n_points + 30
+    assert np.isin(edge_keys(longest), edge_keys(Surface(*grown).edges)).all()

@@ -24,7 +24,7 @@ class Decimation(NamedTuple):
     mesh
         The mesh; sides of another label than 0 form creases. Faces that are gone have -1 as their first corner.
     quadrics
-        A quadric for each point (V, 10), the last row for workspace (V + 1, 10).
+        A quadric for each point, and a last row for workspace (V + 1, 10).
     held
         1 for points that stay (V,).
     on_line
@@ -95,7 +95,7 @@ def _place(state, p, q):
 
 @kernel
 def _thickness(a, b, c):
-    """Return twice the normal of a triangle times its area, and its area over its squared longest side."""
+    """Return the normal of a triangle scaled by twice its area, and its area over its squared longest side."""
     u, v = subtract(b, a), subtract(c, a)
     normal = cross(u, v)
     longest = max(squared_length(u), squared_length(v), squared_length(subtract(v, u)))

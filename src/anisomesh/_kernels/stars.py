@@ -61,5 +61,7 @@ def keeps_topology(mesh, stars, n, closed, n_other, closed_other):
     for k in range(n_other):
         for turn in range(1, 3):
             joined += mesh.faces[stars.other_faces[k], (stars.other_corners[k] + turn) % 3] == gone
+    if not closed and not closed_other and joined == 2:  # an edge across, between two points of the boundary
+        return False
     left = n + n_other - 2 * joined
     return common == joined and left >= (3 if closed_other else 1)

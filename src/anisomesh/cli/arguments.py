@@ -84,7 +84,7 @@ REMESH_OPTIONS: dict[str, Any] = {
     "device": Annotated[DeviceName, _option(help="Where the network runs.")],
     "denoise": Annotated[
         bool,
-        _option("--denoise/--keep-noise", help="Remove the noise that the network finds, or keep it."),
+        _option("--denoise/--keep-noise", help="Remove the noise that the network or the filters find, or keep it."),
     ],
     "fit": Annotated[
         bool,

@@ -86,12 +86,12 @@ class NormalMetric:
         return voronoi.integrate(sites, self.sharpness)
 
     def inverse_blocks(self, voronoi: RestrictedVoronoi, sites: Sites) -> PointTensors | None:
-        """Return the inverse of about the Hessian over twice the mass of each cell, in space (S, 3, 3).
+        """Return approximately the inverse of the Hessian over twice the mass of each cell, in space (S, 3, 3).
 
         Returns
         -------
         ndarray or None
-                The inverse of I + ((c s)^2 - 1) times the mean of N N^t over the cell, c = .35; None for the plain CVT.
+            The inverse of I + ((c s)^2 - 1) times the mean of N N^t over the cell, c = .35; None for s up to 1 / c.
 
         Notes
         -----

@@ -131,7 +131,9 @@ def minimise(
 
     here = evaluate(sites)
     evaluations = 1
-    blocks = energy.inverse_blocks(voronoi, sites) if isinstance(energy, NormalMetric) else None
+    blocks = (
+        energy.inverse_blocks(voronoi, sites) if isinstance(energy, NormalMetric) and options.max_iterations else None
+    )
     pairs: deque[tuple[Sites, Sites, float]] = deque(maxlen=options.memory)
     status = Status.ITERATION_LIMIT
     iteration = 0

@@ -7,11 +7,9 @@ from dataclasses import dataclass
 import numpy as np
 import numpy.typing as npt
 
-from anisomesh._arrays import Faces, PointMask, Points
+from anisomesh._arrays import EdgeEnds, Faces, PointMask, Points
 from anisomesh.mesh.surface import Surface
 from anisomesh.mesh.topology import edge_keys, half_edges
-
-EdgeEnds = npt.NDArray[np.int64]
 
 
 @dataclass(frozen=True, eq=False)

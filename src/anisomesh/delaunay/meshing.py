@@ -7,12 +7,12 @@ from functools import cached_property
 
 import numpy as np
 
-from anisomesh._arrays import Faces, Points, PointTensors, Sites
+from anisomesh._arrays import EdgeEnds, Faces, Points, PointTensors, Sites
 from anisomesh.deadline import NO_DEADLINE, Deadline
 from anisomesh.delaunay.delta_complex import simplicial_mesh
 from anisomesh.delaunay.dual import dual_mesh
 from anisomesh.delaunay.faults import points_at_faults
-from anisomesh.delaunay.feature_mesh import EdgeEnds, FeatureMesh, edges_left, renumbered
+from anisomesh.delaunay.feature_mesh import FeatureMesh, edges_left, renumbered
 from anisomesh.delaunay.placement import place_vertices
 from anisomesh.delaunay.topology_control import ControlledCells, control_topology
 from anisomesh.features.network import FeatureNetwork
@@ -183,13 +183,15 @@ def _attempt(task: MeshingTask, sites: Sites, n_start: int) -> ValidMesh:
     points = mesh.points
     faces = flip_for_shape(points, mesh.faces, roots, task.reference, kept=mesh.crease_edges)
     if len(points) < task.n_vertices:
-        points, faces = split_longest_edges(points, faces, task.n_vertices, task.reference, roots)
+        kept = mesh.crease_edges
+        points, faces = split_longest_edges(points, faces, task.n_vertices, task.reference, roots, kept=kept)
+    none = np.zeros(len(points), dtype=bool)
     tries = _MAX_TRIES if dual is not None else _MAX_TRIES_COARSENED
-    points, faces = _without_crossings(task, points, faces, mesh.crease_edges, tries)
+    points, faces, creases = _without_crossings(task, FeatureMesh(points, faces, mesh.crease_edges, none), tries)
     return ValidMesh(
         points=points,
         faces=faces,
-        crease_edges=edges_left(faces, renumbered(mesh.points, points)[mesh.crease_edges]),
+        crease_edges=creases,
         cells=controlled.cells,
         inserted=max(n_first - n_start, 0) if dual is not None else 0,
         removed=max(n_first - len(points), 0),
@@ -241,21 +243,19 @@ def _coarsened(task: MeshingTask, mesh: FeatureMesh) -> FeatureMesh:
     return _without_inverted(task, FeatureMesh(surface.points, surface.faces, creases, none))
 
 
-def _without_crossings(
-    task: MeshingTask, points: Points, faces: Faces, links: EdgeEnds, tries: int
-) -> tuple[Points, Faces]:
-    """Return the mesh without new self-intersections where possible, with no more points than before where possible."""
-    reference = task.reference
-    n_wanted = max(task.n_vertices, len(points))
+def _without_crossings(task: MeshingTask, mesh: FeatureMesh, tries: int) -> tuple[Points, Faces, EdgeEnds]:
+    """Return the mesh and its crease edges, without new self-intersections and with no more points where possible."""
+    reference, n_wanted = task.reference, max(task.n_vertices, len(mesh.points))
     points, faces, crossing = remove_self_intersections(
-        points, faces, reference, max_tries=tries, deadline=task.deadline
+        mesh.points, mesh.faces, reference, max_tries=tries, deadline=task.deadline
     )
+    creases = edges_left(faces, renumbered(mesh.points, points)[mesh.crease_edges])
     for _ in range(_MAX_TRIMS):
         if len(points) <= n_wanted:
             break
         added = np.arange(len(points)) >= n_wanted
         trimmed = decimate(
-            Surface(points, faces), n_wanted, held=added, crease_edges=links, moves=False, reference=reference
+            Surface(points, faces), n_wanted, held=added, crease_edges=creases, moves=False, reference=reference
         )
         coarser = remove_self_intersections(
             trimmed.surface.points, trimmed.surface.faces, reference, max_tries=_TRIM_TRIES, deadline=task.deadline
@@ -263,5 +263,5 @@ def _without_crossings(
         if coarser[2] > crossing:
             break
         points, faces, crossing = coarser
-        links = trimmed.crease_edges
-    return points, faces
+        creases = edges_left(faces, renumbered(trimmed.surface.points, points)[trimmed.crease_edges])
+    return points, faces, creases

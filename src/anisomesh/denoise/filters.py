@@ -4,16 +4,14 @@ from __future__ import annotations
 
 import numpy as np
 import numpy.typing as npt
-from scipy.sparse import csr_array, diags_array
+from scipy.sparse import csr_array, diags_array, eye_array
 
 from anisomesh._arrays import FaceVectors, Points
 from anisomesh.mesh.geometry import unit
 from anisomesh.mesh.surface import Surface
 
-_SHRINK, _GROW = (
-    0.5,
-    -0.53,
-)  # shares of the way to the mean of the neighbours, a pass band of about .1
+_SHRINK, _GROW = 0.5, -0.53  # shares of the way to the mean of the neighbours: a pass band of about .1
+_MAX_FACES_AT_POINT = 64  # points with more, as in the middle of a fan, make no neighbours: all pairs would be too many
 _CENTRE_WIDTH = 0.9  # deviation of the weights by distance, in roots of the mean area of faces: about their distance
 
 
@@ -60,17 +58,18 @@ def bilateral_filtered(
     effective feature-preserving mesh denoising", 2007 (points).
     """
     at_points = _faces_at_points(surface)
-    near = csr_array(at_points.T @ at_points).tocoo()
-    rows, columns = near.coords
+    few = at_points.sum(axis=1) <= _MAX_FACES_AT_POINT
+    near = csr_array(at_points[few].T @ at_points[few] + eye_array(surface.n_faces))
+    rows = np.repeat(np.arange(surface.n_faces), np.diff(near.indptr))
     centres = surface.points[surface.faces].mean(axis=1)
     width = _CENTRE_WIDTH * np.sqrt(surface.area / surface.n_faces)
-    distance = ((centres[rows] - centres[columns]) ** 2).sum(axis=1)
-    fixed = surface.face_areas[columns] * np.exp(-distance / (2.0 * width**2))
+    distance = ((centres[rows] - centres[near.indices]) ** 2).sum(axis=1)
+    fixed = surface.face_areas[near.indices] * np.exp(-distance / (2.0 * width**2))
     normals = surface.face_normals
     for _ in range(rounds):
-        difference = ((normals[rows] - normals[columns]) ** 2).sum(axis=1)
-        weights = fixed * np.exp(-difference / (2.0 * normal_width**2))
-        normals = unit(csr_array((weights, (rows, columns)), shape=near.shape) @ normals)
+        difference = ((normals[rows] - normals[near.indices]) ** 2).sum(axis=1)
+        near.data = fixed * np.exp(-difference / (2.0 * normal_width**2))
+        normals = unit(near @ normals)
     return surface.with_points(_following(surface, at_points, normals, point_steps))
 
 

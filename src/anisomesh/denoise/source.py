@@ -5,6 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass, replace
 
 from anisomesh.denoise.classical import classically_denoised
+from anisomesh.errors import OptionError
 from anisomesh.mesh.noise import noise_height
 from anisomesh.mesh.surface import Surface
 from anisomesh.metric.field import MetricField
@@ -29,6 +30,10 @@ class Filtered:
 
     denoise: bool = True
     crease_angle: float = 40.0
+
+    def __post_init__(self) -> None:
+        if not isinstance(self.denoise, bool):
+            raise OptionError(f"denoise = {self.denoise!r}; expected True or False")
 
     def __call__(self, surface: Surface) -> MetricField:
         """Return the metric at the points of a surface."""

@@ -5,10 +5,9 @@ from __future__ import annotations
 from dataclasses import dataclass, field
 
 import numpy as np
-import numpy.typing as npt
 from scipy.spatial import cKDTree
 
-from anisomesh._arrays import PointMask, Points
+from anisomesh._arrays import EdgeEnds, PointMask, Points
 from anisomesh.features.detect import sharp_edges
 from anisomesh.fitting.arrays import FitTask
 from anisomesh.fitting.fit import FitPlan
@@ -20,8 +19,6 @@ from anisomesh.metric.transfer import PlacedMetric
 
 _SAME_PLACE = 1e-9  # at bounding-box diagonal 1
 _SAMPLES_PER_VERTEX, _MIN_SAMPLES = 40, 10_000  # fewer than 40 are fitted better than the surface between them
-
-EdgeEnds = npt.NDArray[np.int64]
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)

@@ -7,11 +7,11 @@ from dataclasses import replace
 import numpy as np
 from scipy.spatial import cKDTree
 
-from anisomesh._arrays import FaceLabels, PointMask
+from anisomesh._arrays import EdgeEnds, FaceLabels, PointMask
 from anisomesh.deadline import NO_DEADLINE, Deadline
 from anisomesh.fitting.arrays import FitTask
 from anisomesh.fitting.fit import FitOptions, fit_mesh
-from anisomesh.fitting.target import EdgeEnds, FitTarget
+from anisomesh.fitting.target import FitTarget
 from anisomesh.mesh.closest_points import ClosestPoints
 from anisomesh.mesh.surface import Surface
 from anisomesh.mesh.topology import with_neighbours

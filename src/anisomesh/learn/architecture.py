@@ -60,7 +60,7 @@ class NetworkOptions:
 
     def __post_init__(self) -> None:
         for name in ("channels", "scales", "blocks", "heads"):
-            if getattr(self, name) < 1:
+            if not isinstance(getattr(self, name), int) or getattr(self, name) < 1:
                 raise OptionError(f"[network] {name} = {getattr(self, name)}; expected at least 1")
         if self.heads > self.scales:
             raise OptionError(f"[network] heads = {self.heads}; expected no more than scales, {self.scales}")
@@ -85,7 +85,8 @@ class PaperOptions:
     ratio: float = 0.5
 
     def __post_init__(self) -> None:
-        if self.channels < 1 or self.levels < 0 or not 0.0 < self.ratio <= 1.0:
+        whole = isinstance(self.channels, int) and isinstance(self.levels, int)
+        if not whole or self.channels < 1 or self.levels < 0 or not 0.0 < self.ratio <= 1.0:
             raise OptionError(
                 f"[paper] channels = {self.channels}, levels = {self.levels}, ratio = {self.ratio}; "
                 "expected at least 1 channel, no negative number of levels, and a ratio above 0 and at most 1"

@@ -88,13 +88,15 @@ def read_safetensors(path: Path) -> tuple[dict[str, npt.NDArray[Any]], dict[str,
         header = table.pop("__metadata__", {})
         body = memoryview(data)[8 + length :]
         return {name: _array(entry, body) for name, entry in table.items()}, header
-    except (OSError, ValueError, KeyError, TypeError, AttributeError) as error:
+    except (OSError, ValueError, KeyError, TypeError, AttributeError, RecursionError) as error:
         raise WeightsError(f"{path}: cannot be read as safetensors: {error}") from error
 
 
 def _array(entry: dict[str, Any], body: memoryview) -> npt.NDArray[Any]:
     """Return the array of an entry of the header."""
     start, end = entry["data_offsets"]
+    if entry["dtype"] not in _DTYPES:
+        raise ValueError(f"numbers of type {entry['dtype']}; expected one of {', '.join(_DTYPES)}")
     dtype, shape = _DTYPES[entry["dtype"]], tuple(entry["shape"])
     if not 0 <= start <= end <= len(body) or end - start != dtype.itemsize * int(np.prod(shape, dtype=np.int64)):
         raise ValueError(f"bytes {start} to {end} of {len(body)} do not hold an array of shape {shape}")

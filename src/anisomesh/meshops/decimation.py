@@ -5,10 +5,9 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-import numpy.typing as npt
 from scipy.spatial import cKDTree
 
-from anisomesh._arrays import FaceMask, PointMask
+from anisomesh._arrays import EdgeEnds, FaceMask, PointMask
 from anisomesh._kernels import decimate as kernels
 from anisomesh._kernels.heap import EdgeHeap
 from anisomesh._kernels.stars import Stars
@@ -22,8 +21,6 @@ _STAR_ROOM = 4_096  # faces around a point; a point with more, as in the middle 
 _MAX_REPEATS = 4  # with points held where triangles were inverted
 _LEAST_EVENNESS, _EVENNESS = 1e-9, 1e-3  # weight of squared lengths where points move, and where not; heuristic
 _HEAP_ROOM = 12  # entries for each point, half of which are all edges at the start
-
-EdgeEnds = npt.NDArray[np.int64]
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -62,7 +59,8 @@ def decimate(
     held
         Points (V,) that stay.
     crease_edges
-        Ends of edges along creases (n, 2): points on them only go along them, and stay where they end or meet.
+        Ends of edges along creases (n, 2): points on them only go along them, and stay where they end, meet or reach
+        the boundary.
     moves
         Whether new points may be anywhere; if not, they are points of the surface, and short edges go first where
         distances are small: the mesh has good triangles that are to stay so.
@@ -135,8 +133,8 @@ def _arrays(surface: Surface, held: PointMask, creases: EdgeEnds, *, moves: bool
     """Return the arrays that the kernels work on."""
     n = surface.n_points
     labels = np.isin(edge_keys(surface.edges), edge_keys(creases)).astype(np.int32)
-    on_line = np.array(surface.on_boundary)
-    on_line[creases] = True
+    on_crease = np.zeros(n, dtype=bool)
+    on_crease[creases[~np.isin(edge_keys(creases), edge_keys(surface.edges[surface.edge_face_count == 1]))]] = True
     face_at = np.zeros(n, dtype=np.int32)
     face_at[surface.faces] = np.arange(surface.n_faces, dtype=np.int32)[:, None]
     size = _HEAP_ROOM * n
@@ -144,8 +142,8 @@ def _arrays(surface: Surface, held: PointMask, creases: EdgeEnds, *, moves: bool
     return kernels.Decimation(
         mesh=MarkedSurface.unmoved(surface, labels).triangulation(surface.n_faces),
         quadrics=np.zeros((n + 1, 10)),
-        held=(ends_of_creases(creases, n) | held).astype(np.uint8),
-        on_line=on_line.astype(np.uint8),
+        held=(ends_of_creases(creases, n) | (surface.on_boundary & on_crease) | held).astype(np.uint8),
+        on_line=(surface.on_boundary | on_crease).astype(np.uint8),
         moves=moves,
         evenness=_LEAST_EVENNESS if moves else _EVENNESS,
         face_at=face_at,

@@ -4,9 +4,10 @@ from __future__ import annotations
 
 import numpy as np
 
-from anisomesh._arrays import Faces, Points, PointTensors
+from anisomesh._arrays import EdgeEnds, Faces, Points, PointTensors
 from anisomesh.mesh.closest_points import ClosestPoints
 from anisomesh.mesh.surface import Surface
+from anisomesh.mesh.topology import edge_keys
 from anisomesh.meshops.change import Change, Floats, apply_changes
 
 _POOL = 8  # edges looked at for each point that is missing
@@ -29,7 +30,13 @@ def face_split(surface: Surface, face: int, place: Floats) -> Change:
 
 
 def split_longest_edges(
-    points: Points, faces: Faces, n_points: int, reference: ClosestPoints, roots: PointTensors
+    points: Points,
+    faces: Faces,
+    n_points: int,
+    reference: ClosestPoints,
+    roots: PointTensors,
+    *,
+    kept: EdgeEnds | None = None,
 ) -> tuple[Points, Faces]:
     """Split edges, the longest in the metric first, until there are ``n_points`` points, or no edge will do.
 
@@ -44,13 +51,18 @@ def split_longest_edges(
         one on the boundary stays in the middle; no inverted triangle is made.
     roots
         Symmetric square roots of the metric at the points (V, 3, 3).
+    kept
+        Ends of edges that are not split (n, 2).
     """
+    unsplit = np.zeros(0, dtype=np.int64) if kept is None else edge_keys(kept)
     while len(points) < n_points:
         surface = Surface(points, faces)
         ends = surface.edges.astype(np.int64)
         way = points[ends[:, 1]] - points[ends[:, 0]]
         length = np.linalg.norm(np.einsum("eij,ej->ei", roots[ends].mean(axis=1), way), axis=1)
-        pool = np.argsort(-length, kind="stable")[: max(_POOL * (n_points - len(points)), 64)]
+        length[np.isin(edge_keys(ends), unsplit)] = -1.0
+        pool = np.argsort(-length, kind="stable")[: np.count_nonzero(length >= 0.0)]
+        pool = pool[: max(_POOL * (n_points - len(points)), 64)]
         middle = points[ends[pool]].mean(axis=1)
         facet, weights = reference.locate(middle)
         places = np.einsum("nc,ncx->nx", weights, reference.surface.points[reference.surface.faces[facet]])

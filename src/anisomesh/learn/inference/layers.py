@@ -49,9 +49,9 @@ class Layers:
         found = {name: array.shape for name, array in arrays.items()}
         for name in sorted(found.keys() | shapes.keys()):
             if found.get(name) != shapes.get(name):
-                here, wanted = (table.get(name, "missing") for table in (found, shapes))
-                raise WeightsError(f"{name} is {here}; expected {wanted}")
-        self._arrays = {name: np.ascontiguousarray(array, dtype=np.float32) for name, array in arrays.items()}
+                wanted = shapes.get(name, "no such array")
+                raise WeightsError(f"{name} has shape {found.get(name, 'missing')}; expected {wanted}")
+        self._arrays = {name: np.array(array, dtype=np.float32, order="C") for name, array in arrays.items()}
         self._matrices = {name: np.ascontiguousarray(a.T) for name, a in self._arrays.items() if a.ndim == 2}
 
     def array(self, name: str) -> Floats:

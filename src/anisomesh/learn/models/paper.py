@@ -1,6 +1,6 @@
 """The network of the paper: a Graph U-Net with Top-K pooling, from points and normals to the extra coordinates.
 
-Names of modules, are the names in files of weights and configurations.
+Names of modules are the names in files of weights and configurations.
 """
 
 from __future__ import annotations

@@ -1,6 +1,6 @@
 """The default network: from a graph hierarchy to a line field of stretch, and to offsets that remove noise.
 
-Names of modules, are the names in files of weights and configurations.
+Names of modules are the names in files of weights and configurations.
 """
 
 from __future__ import annotations
