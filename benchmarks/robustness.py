@@ -34,7 +34,7 @@ def run(path: Path, ratio: float, embedding: str) -> dict[str, Any]:
     with tempfile.TemporaryDirectory() as folder:
         out = Path(folder) / "out.ply"
         words = ["remesh", str(path), "-o", str(out), "--ratio", str(ratio), "--embedding", embedding]
-        command = [sys.executable, "-c", "from anisomesh.cli.main import run; run()", *words, "--json", "--quiet"]
+        command = [sys.executable, "-m", "anisomesh", *words, "--json", "--quiet"]
         row: dict[str, Any] = {"mesh": f"{path.parent.name}/{path.name}", "ratio": ratio, "embedding": embedding}
         start = time.perf_counter()
         try:
