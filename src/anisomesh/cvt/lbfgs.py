@@ -109,7 +109,7 @@ def minimise(
     Notes
     -----
     Two-loop recursion with the inverse of twice the masses as initial matrix, scaled as usual by the last pair: for the
-    plain CVT and no pairs the step is Lloyd's. With the normal metric each site has a block more, which halves the
+    plain CVT and no pairs the step is Lloyd's. With the normal metric each site has a block more, which saves
     iterations (:meth:`~anisomesh.cvt.energy.NormalMetric.inverse_blocks`). The line search accepts the weak Wolfe
     conditions by bisection (Lewis and Overton 2013), from step 1. All sums are NumPy's own, so the result does not
     depend on a threaded BLAS.

@@ -5,9 +5,8 @@ from __future__ import annotations
 from dataclasses import replace
 
 import numpy as np
-from scipy.spatial import cKDTree
 
-from anisomesh._arrays import EdgeEnds, FaceLabels, PointMask
+from anisomesh._arrays import EdgeEnds
 from anisomesh.deadline import NO_DEADLINE, Deadline
 from anisomesh.fitting.arrays import FitTask
 from anisomesh.fitting.fit import FitOptions, fit_mesh
@@ -17,6 +16,7 @@ from anisomesh.mesh.surface import Surface
 from anisomesh.mesh.topology import with_neighbours
 from anisomesh.mesh.validity import faulty_faces
 from anisomesh.meshops.decimation import decimate
+from anisomesh.meshops.held import points_near_faces
 from anisomesh.meshops.inverted import remove_inverted_triangles
 from anisomesh.meshops.self_intersections import remove_self_intersections
 
@@ -85,7 +85,7 @@ def _fitted(
             faulty = faulty_faces(fitted, target.reference)
         if len(faulty) <= max_faults:
             return fitted
-        near = _points_near(mesh, fitted, faulty)
+        near = points_near_faces(mesh, fitted, faulty, rings=1)
         if task.held[near].all():
             near = with_neighbours(mesh.faces, near)
         task = replace(task, held=task.held | near, kept=task.kept | near[mesh.edges].all(axis=1))
@@ -97,11 +97,3 @@ def _repaired(mesh: Surface, reference: ClosestPoints, deadline: Deadline) -> Su
     points, faces, _ = remove_inverted_triangles(mesh.points, mesh.faces, reference, deadline=deadline)
     points, faces, _ = remove_self_intersections(points, faces, reference, max_tries=_MAX_REPAIRS, deadline=deadline)
     return Surface(points, faces) if len(points) == mesh.n_points else mesh
-
-
-def _points_near(mesh: Surface, fitted: Surface, faces: FaceLabels) -> PointMask:
-    """Return which points of a mesh (V,) are nearest to these faces (n,) of the fitted mesh, and their neighbours."""
-    places = fitted.points[np.unique(fitted.faces[faces])]
-    near = np.zeros(mesh.n_points, dtype=bool)
-    near[cKDTree(mesh.points).query(places)[1]] = True
-    return with_neighbours(mesh.faces, near)

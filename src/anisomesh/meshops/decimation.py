@@ -5,17 +5,17 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.spatial import cKDTree
 
-from anisomesh._arrays import EdgeEnds, FaceMask, PointMask
+from anisomesh._arrays import EdgeEnds, PointMask
 from anisomesh._kernels import decimate as kernels
 from anisomesh._kernels.heap import EdgeHeap
 from anisomesh._kernels.stars import Stars
 from anisomesh.mesh.closest_points import ClosestPoints
 from anisomesh.mesh.marked_surface import MarkedSurface
 from anisomesh.mesh.surface import Surface
-from anisomesh.mesh.topology import edge_keys, with_neighbours
+from anisomesh.mesh.topology import edge_keys
 from anisomesh.mesh.validity import inverted_faces
+from anisomesh.meshops.held import points_near_faces
 
 _STAR_ROOM = 4_096  # faces around a point; a point with more, as in the middle of a fan, stays
 _MAX_REPEATS = 4  # with points held where triangles were inverted
@@ -91,21 +91,12 @@ def decimate(
     for repeat in range(_MAX_REPEATS):
         if np.count_nonzero(fewest) <= least or result.surface.n_points > best.surface.n_points:
             break
-        stays |= _points_near(surface, result.surface, inverted, rings=repeat)
+        stays |= points_near_faces(surface, result.surface, inverted, rings=repeat)
         result = _collapsed(surface, n_points, stays, creases, moves=moves)
         inverted = inverted_faces(result.surface, reference)
         if result.surface.n_points <= best.surface.n_points and inverted.sum() < fewest.sum():
             best, fewest = result, inverted
     return best
-
-
-def _points_near(surface: Surface, result: Surface, faces: FaceMask, *, rings: int) -> PointMask:
-    """Return the points of a surface (V,) nearest to corners of faces (F,) of the result, and rings of neighbours."""
-    near = np.zeros(surface.n_points, dtype=bool)
-    near[cKDTree(surface.points).query(result.points[np.unique(result.faces[faces])])[1]] = True
-    for _ in range(rings):
-        near = with_neighbours(surface.faces, near)
-    return near
 
 
 def _collapsed(surface: Surface, n_points: int, held: PointMask, creases: EdgeEnds, *, moves: bool) -> Decimated:
