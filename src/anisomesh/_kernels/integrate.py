@@ -20,7 +20,7 @@ from .compiled import inlined, kernel
 
 
 @inlined
-def _moments(vertex, start, end):
+def moments(vertex, start, end):
     """Return the area as a fraction of the facet, M1 (a, b, c) and M2 (bc, ca, ab) of a polygon."""
     area = 0.0
     ma = mb = mc = 0.0
@@ -42,7 +42,7 @@ def _moments(vertex, start, end):
 
 
 @inlined
-def _height(facets, facet, positions, site):
+def height(facets, facet, positions, site):
     """Return h = N . (v_a - x), the signed distance of a site x from the plane of a facet."""
     corner = facets.faces[facet, 0]
     h = 0.0
@@ -52,19 +52,29 @@ def _height(facets, facet, positions, site):
 
 
 @inlined
-def _boundary_motion(ws, k, following, i, j, jump, side2, area):
-    """Return the coefficient of (m - x_i) for the bisector edge k to following between slots i and j."""
-    da = ws.vertex[following, 0] - ws.vertex[k, 0]
-    db = ws.vertex[following, 1] - ws.vertex[k, 1]
-    dc = ws.vertex[following, 2] - ws.vertex[k, 2]
+def boundary_rate(vertex, k, following, p, q, side2):
+    """Return L / (2 A g) for the edge k to following of a polygon on a bisector: L its length, A the facet's area.
+
+    g is the gradient in the facet of the linear form of the bisector, whose values at the corners b and c exceed the
+    value at a by p and q.
+    """
+    da = vertex[following, 0] - vertex[k, 0]
+    db = vertex[following, 1] - vertex[k, 1]
+    dc = vertex[following, 2] - vertex[k, 2]
     length2 = -(db * dc * side2[0] + dc * da * side2[1] + da * db * side2[2])
-    p = (ws.table[j, 1] - ws.table[i, 1]) - (ws.table[j, 0] - ws.table[i, 0])
-    q = (ws.table[j, 2] - ws.table[i, 2]) - (ws.table[j, 0] - ws.table[i, 0])
     # 4 area^2 |gradient|^2 from the differences p and q along the sides ab (side2[2]) and ac (side2[1])
     slope2 = p * p * side2[1] - p * q * (side2[1] + side2[2] - side2[0]) + q * q * side2[2]
     if length2 <= 0.0 or slope2 <= 0.0:
         return 0.0
-    return jump * 4.0 * area * np.sqrt(length2 / slope2)
+    return np.sqrt(length2 / slope2)
+
+
+@inlined
+def _boundary_motion(ws, k, following, i, j, jump, side2, area):
+    """Return the coefficient of (m - x_i) for the bisector edge k to following between slots i and j."""
+    p = (ws.table[j, 1] - ws.table[i, 1]) - (ws.table[j, 0] - ws.table[i, 0])
+    q = (ws.table[j, 2] - ws.table[i, 2]) - (ws.table[j, 0] - ws.table[i, 0])
+    return jump * 4.0 * area * boundary_rate(ws.vertex, k, following, p, q, side2)
 
 
 @kernel
@@ -105,7 +115,7 @@ def integrate_chunk(chunk, owners, facets, sites, ws, sharpness, row_of, touched
                 for k in range(dimension + 2):
                     accumulated[row, k] = 0.0
                 n_touched += 1
-            fraction, ma, mb, mc, mbc, mca, mab = _moments(ws.vertex, start, stop)
+            fraction, ma, mb, mc, mbc, mca, mab = moments(ws.vertex, start, stop)
             mass = area * fraction
             energy = area * (
                 (ws.table[i, 0] * ma + ws.table[i, 1] * mb + ws.table[i, 2] * mc)
@@ -114,7 +124,7 @@ def integrate_chunk(chunk, owners, facets, sites, ws, sharpness, row_of, touched
             own_weight = 2.0 * mass
             weight_a, weight_b, weight_c = -2.0 * area * ma, -2.0 * area * mb, -2.0 * area * mc
             if extra > 0.0:
-                h = _height(facets, facet, sites.positions, site)
+                h = height(facets, facet, sites.positions, site)
                 energy += extra * mass * h * h
                 for k in range(3):
                     accumulated[row, k] -= 2.0 * extra * mass * h * facets.normal[facet, k]
@@ -122,7 +132,7 @@ def integrate_chunk(chunk, owners, facets, sites, ws, sharpness, row_of, touched
                     j = ws.label[k]
                     if j < 0:
                         continue
-                    h_j = _height(facets, facet, sites.positions, ws.candidate[j])
+                    h_j = height(facets, facet, sites.positions, ws.candidate[j])
                     following = k + 1 if k + 1 < stop else start
                     weight = _boundary_motion(ws, k, following, i, j, extra * (h * h - h_j * h_j), side2, area)
                     own_weight -= weight
