@@ -26,7 +26,7 @@ def stretch_along_z():
 
 def test_every_example_is_tested():
     tested = {"remesh_a_surface", "own_metric", "gallery", "noisy_scan"}
-    tutorials = {"own_metric_source", "own_energy", "own_embedder", "stages"}
+    tutorials = {"own_metric_source", "own_energy", "own_embedder", "stages", "learn_a_metric"}
     assert {path.stem for path in FOLDER.glob("*.py")} == tested | tutorials
 
 
@@ -116,3 +116,16 @@ def test_stages_make_a_valid_mesh_step_by_step(tmp_path, capsys):
     words = [line.split(":")[0] for line in capsys.readouterr().out.splitlines()]
     assert words == ["prepared", "metric", "embedding", "features", "sites", "dual", "fitted"]
     assert (tmp_path / "stages.png").stat().st_size > 10_000
+
+
+@pytest.mark.slow
+def test_learn_a_metric_finds_the_stretch_of_the_given_mesh(tmp_path, capsys):
+    pytest.importorskip("torch")
+    losses = example("learn_a_metric").main(str(tmp_path / "learned.png"), n_given=250, n_vertices=300, steps=50)
+    assert losses[-1] < 1.1 < 1.25 < losses[0]
+    lines = capsys.readouterr().out.splitlines()
+    before, after = (float(line.split()[0]) for line in lines[1].split("factor of ")[1].split("before,"))
+    assert before > 1.5 > 1.2 > after
+    given, remeshed = (float(line.split("mean stretch ")[1]) for line in lines[2:4])
+    assert remeshed == pytest.approx(given, rel=0.15)
+    assert (tmp_path / "learned.png").stat().st_size > 10_000
