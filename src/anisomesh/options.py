@@ -23,7 +23,7 @@ DeviceName = Literal["cpu", "cuda"]
 MAX_THREADS = 1024
 MIN_VERTICES = 4  # a tetrahedron
 _LARGEST_RATIO = 1e12  # vertices per vertex of the input; more is a mistake
-_NUMBERS = ("sharpness", "feature_angle", "weld_tolerance")
+_NUMBERS = ("sharpness", "feature_angle", "weld_tolerance", "shape_weight")
 _OPTIONAL_NUMBERS = ("final_sharpness", "time_limit")
 _LEAST = {"seed": 0, "threads": 1, "lloyd_iterations": 0, "max_iterations": 0, "embedding_iterations": 1}
 
@@ -70,6 +70,9 @@ class RemeshOptions:
         Whether the mesh is fitted to the input at the end: vertices move and edges are flipped such that distance and
         shape of the triangles get better together. Without it the result is the dual of the tessellation, as in the
         paper; so it is with an ``energy`` other than ``NormalMetric``. With a ``density`` no points are exchanged.
+    shape_weight
+        How much the shape of triangles counts in the fit, against their distance from the input: larger than 1 for
+        better shaped triangles, smaller for nearer ones.
     seed
         Seed of the start positions; the same seed and input give the same result. If the mesh has inverted or
         intersecting triangles that the input does not explain, the next two seeds are tried.
@@ -103,6 +106,7 @@ class RemeshOptions:
     device: str = "cpu"
     denoise: bool = True
     fit: bool = True
+    shape_weight: float = 1.0
     seed: int = 0
     threads: int = 2
     lloyd_iterations: int = 9
@@ -123,6 +127,8 @@ class RemeshOptions:
             raise OptionError(f"feature_angle = {self.feature_angle}; expected 0 to 180 degrees")
         if not (self.weld_tolerance >= 0.0 and math.isfinite(self.weld_tolerance)):
             raise OptionError(f"weld_tolerance = {self.weld_tolerance}; expected a length of at least 0")
+        if not (self.shape_weight > 0.0 and math.isfinite(self.shape_weight)):
+            raise OptionError(f"shape_weight = {self.shape_weight}; expected a positive number, such as 4 or 0.25")
         if self.time_limit is not None and not self.time_limit > 0.0:
             raise OptionError(f"time_limit = {self.time_limit}; expected a positive number of seconds")
         if self.threads > MAX_THREADS:

@@ -140,7 +140,12 @@ def fit_plan(options: RemeshOptions, surface: Surface, *, nearest: bool = False)
         decimation = _NEAREST
     elif least_distance and is_designed(surface):
         decimation = _NEAREST_DECIMATION
-    return FitPlan(mesh=chosen, decimation=decimation, threads=options.threads)
+    weight = options.shape_weight
+    return FitPlan(
+        mesh=chosen.weighted(weight),
+        decimation=None if decimation is None else decimation.weighted(weight),
+        threads=options.threads,
+    )
 
 
 def is_fitted(options: RemeshOptions) -> bool:

@@ -45,6 +45,22 @@ def test_prescribed_edges_stay_on_their_lines():
     assert covered == pytest.approx(whole, rel=1e-6)
 
 
+def test_the_weight_of_the_shape_trades_distance_for_quality():
+    shape = shapes.open_patch(lambda x, y: 0.3 * np.sin(4 * x) * y, n=40)
+    results = [
+        anisomesh.remesh(shape, n_vertices=150, embedding="direct", shape_weight=weight) for weight in (0.1, 1.0, 10.0)
+    ]
+    found = [anisomesh.evaluate(shape, result.surface, samples=20_000) for result in results]
+    assert found[0].distance.rms < found[1].distance.rms < found[2].distance.rms
+    assert found[0].shape.g_mean < found[2].shape.g_mean
+
+
+@pytest.mark.parametrize("weight", [0.0, -1.0, float("nan"), float("inf")])
+def test_a_weight_of_the_shape_that_is_not_positive_is_refused(weight):
+    with pytest.raises(anisomesh.OptionError, match="shape_weight"):
+        anisomesh.RemeshOptions(shape_weight=weight)
+
+
 @pytest.mark.parametrize("fit", ["yes", 1, None])
 def test_another_value_of_fit_is_refused(fit):
     with pytest.raises(anisomesh.OptionError, match="fit"):

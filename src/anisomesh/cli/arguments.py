@@ -90,6 +90,14 @@ REMESH_OPTIONS: dict[str, Any] = {
         bool,
         _option("--fit/--no-fit", help="Fit the mesh to the input at the end, or leave the dual of the tessellation."),
     ],
+    "shape_weight": Annotated[
+        float,
+        _option(
+            callback=positive,
+            help="How much the shape of triangles counts in the fit: above 1 for better shaped ones, below 1 for nearer "
+            "ones.",
+        ),
+    ],
     "seed": Annotated[
         int,
         _option(min=0, help="Seed of the initial sites; the same seed and input give the same result."),

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 from anisomesh.deadline import NO_DEADLINE, Deadline
 from anisomesh.fitting.arrays import FitTask
@@ -36,11 +36,15 @@ class FitOptions:
         error is not 1.5 times the one at the start. 0 for a price that stays.
     """
 
-    price: float = 8.0
+    price: float = 16.0
     exchange_price: float = 2.0
     rounds: int = 4
     share: float = 0.05
     min_quality: float = 0.0
+
+    def weighted(self, shape_weight: float) -> FitOptions:
+        """Return the options with prices times a factor."""
+        return replace(self, price=shape_weight * self.price, exchange_price=shape_weight * self.exchange_price)
 
 
 @dataclass(frozen=True, kw_only=True)

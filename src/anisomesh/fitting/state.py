@@ -8,7 +8,8 @@ import numpy as np
 import numpy.typing as npt
 
 from anisomesh._kernels import fit_collapses, fit_moves, fit_samples, fit_splits
-from anisomesh.fitting.arrays import FitTask, fit_arrays_of, workspace
+from anisomesh.fitting.arrays import STAYS, FitTask, fit_arrays_of, workspace
+from anisomesh.fitting.planes import onto_planes
 from anisomesh.fitting.samples import SurfaceSamples
 from anisomesh.mesh.surface import Surface
 from anisomesh.threads import Workers
@@ -45,6 +46,7 @@ class FitState:
 
     def __init__(self, task: FitTask, samples: SurfaceSamples, n_spare: int, threads: int = 1) -> None:
         self.fit = fit_arrays_of(task, samples, n_spare)
+        self._samples = samples
         self._workers = Workers(threads)
         others = (self.fit._replace(patch=workspace(len(self.fit.freedom))) for _ in range(threads - 1))
         self._views = [self.fit, *others]  # each with a workspace of its own
@@ -176,10 +178,12 @@ class FitState:
             array[...] = before
 
     def surface(self) -> Surface:
-        """Return the mesh; without exchange its points are the ones of the start, in their order."""
+        """Return the mesh, exact in planes; without exchange its points are the ones of the start, in their order."""
         mesh = self.fit.mesh
+        movable = self.fit.freedom != STAYS
+        points = onto_planes(mesh.points, mesh.faces, self._samples, self.fit.samples.owner, movable)
         used, position = np.unique(mesh.faces[mesh.faces[:, 0] >= 0], return_inverse=True)
-        return Surface(mesh.points[used], position.reshape(-1, 3).astype(np.int32))
+        return Surface(points[used], position.reshape(-1, 3).astype(np.int32))
 
     def _changing(self) -> list[npt.NDArray[np.generic]]:
         fit = self.fit

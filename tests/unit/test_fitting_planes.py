@@ -1,0 +1,65 @@
+"""Points of a fitted mesh in planes of the surface are exactly there, and others stay."""
+
+import numpy as np
+import pytest
+
+from anisomesh.features.detect import sharp_edges
+from anisomesh.fitting.planes import onto_planes
+from anisomesh.fitting.samples import sample_surface
+from anisomesh.mesh.closest_points import ClosestPoints
+from anisomesh.metric.field import MetricField
+from anisomesh.metric.transfer import PlacedMetric
+from anisomesh.shapes import analytic as shapes
+
+
+def samples_on(surface, count=4_000):
+    """Return samples of a surface and the faces that they are nearest to."""
+    reference = ClosestPoints(surface)
+    samples = sample_surface(
+        surface,
+        count,
+        creases=np.zeros(len(surface.edges), dtype=bool),
+        metric=PlacedMetric(reference, MetricField(tensors=np.tile(np.eye(3), (surface.n_points, 1, 1)))),
+        rng=np.random.default_rng(0),
+    )
+    return samples, reference.locate(samples.points)[0].astype(np.int32)
+
+
+def test_points_of_a_box_come_back_to_its_planes():
+    cube = shapes.box(n=6)
+    samples, owner = samples_on(cube)
+    noise = np.random.default_rng(1).uniform(-1e-7, 1e-7, cube.points.shape)
+    moved = onto_planes(cube.points + noise, cube.faces, samples, owner, np.ones(cube.n_points, dtype=bool))
+    off = np.abs(moved[cube.faces] - cube.points[cube.faces])
+    normal = np.abs(cube.face_normals)[:, None, :]
+    assert (off * normal).max() < 1e-15
+    at_edge = np.unique(cube.edges[sharp_edges(cube, 40.0)])
+    inner = np.setdiff1d(np.arange(cube.n_points), at_edge)
+    along = np.abs(moved - cube.points - noise)[inner]
+    assert np.sort(along, axis=1)[:, :2].max() < 1e-15  # no step within the plane
+
+
+@pytest.mark.parametrize("size", [1e-3, 1e-4])
+def test_points_farther_from_a_plane_stay(size):
+    cube = shapes.box(n=6)
+    samples, owner = samples_on(cube)
+    bent = cube.points * (1.0 + size)
+    movable = np.ones(cube.n_points, dtype=bool)
+    assert np.array_equal(onto_planes(bent, cube.faces, samples, owner, movable), bent)
+
+
+def test_held_points_stay():
+    cube = shapes.box(n=6)
+    samples, owner = samples_on(cube)
+    bent = cube.points * (1.0 + 1e-7)
+    movable = np.zeros(cube.n_points, dtype=bool)
+    assert np.array_equal(onto_planes(bent, cube.faces, samples, owner, movable), bent)
+
+
+def test_a_coarse_mesh_of_a_sphere_stays():
+    fine, coarse = shapes.sphere(subdivisions=5), shapes.sphere(subdivisions=2)
+    samples, _ = samples_on(fine)
+    owner = ClosestPoints(coarse).locate(samples.points)[0].astype(np.int32)
+    movable = np.ones(coarse.n_points, dtype=bool)
+    moved = onto_planes(coarse.points, coarse.faces, samples, owner, movable)
+    assert np.array_equal(moved, coarse.points)
