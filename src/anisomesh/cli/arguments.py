@@ -94,8 +94,8 @@ REMESH_OPTIONS: dict[str, Any] = {
         float,
         _option(
             callback=positive,
-            help="How much the shape of triangles counts in the fit: above 1 for better shaped ones, below 1 for nearer "
-            "ones.",
+            help="How much the shape of triangles counts in the fit: above 1 for better shaped triangles, below 1 for "
+            "a smaller distance.",
         ),
     ],
     "seed": Annotated[

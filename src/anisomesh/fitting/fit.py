@@ -36,7 +36,7 @@ class FitOptions:
         error is not 1.5 times the one at the start. 0 for a price that stays.
     """
 
-    price: float = 16.0
+    price: float = 20.0
     exchange_price: float = 2.0
     rounds: int = 4
     share: float = 0.05
