@@ -23,6 +23,7 @@ if TYPE_CHECKING:
     from anisomesh.embedding.precomputed import precomputed_embedding
     from anisomesh.errors import AnisomeshError, MeshError, MeshFileError, MetricError, OptionError
     from anisomesh.evaluation.report import Evaluation, evaluate
+    from anisomesh.execution.progress import StepInfo
     from anisomesh.features.network import trace_features
     from anisomesh.fitting.target import FitTarget
     from anisomesh.fitting.valid import fit_without_faults
@@ -35,7 +36,6 @@ if TYPE_CHECKING:
     from anisomesh.metric.transfer import PlacedMetric
     from anisomesh.options import RemeshOptions
     from anisomesh.pipeline import remesh
-    from anisomesh.progress import StepInfo
     from anisomesh.repair.prepare import prepare
     from anisomesh.result import RemeshResult, save_rvd
     from anisomesh.shapes.analytic import sample
@@ -49,7 +49,7 @@ _MODULE_OF = {
     "remesh": "pipeline",
     "RemeshOptions": "options",
     "RemeshResult": "result",
-    "StepInfo": "progress",
+    "StepInfo": "execution.progress",
     # meshes in and out, judged and drawn
     "Surface": "mesh.surface",
     "load": "io.meshes",

@@ -12,8 +12,8 @@ import numpy.typing as npt
 from anisomesh._arrays import Sites, SiteScalars
 from anisomesh._kernels import clip, diagram, integrate
 from anisomesh.errors import OptionError
+from anisomesh.execution.threads import Workers
 from anisomesh.mesh.embedded_surface import EmbeddedSurface
-from anisomesh.threads import Workers
 from anisomesh.voronoi.diagram import Diagram, DiagramPart, assemble
 from anisomesh.voronoi.neighbour_lists import NeighbourLists
 
