@@ -76,8 +76,7 @@ def load(path: str | os.PathLike[str]) -> Surface:
         raise MeshFileError(f"{path}: the file is empty; expected a mesh")
     try:
         soup = _READERS[suffix](data) if suffix in _READERS else _PATH_READERS[suffix](path)
-        polygons.validate(soup)
-        return Surface(soup.points, polygons.triangulate(soup))
+        surface, _, remarks = polygons.as_triangles(soup)
     except Exception as error:
         # Our readers raise ValueError with an explanation; other exceptions come from libraries.
         reason = str(error)
@@ -85,6 +84,9 @@ def load(path: str | os.PathLike[str]) -> Surface:
             reason = f"malformed or truncated ({type(error).__name__}: {error})"
         reason = " ".join(reason.split())
         raise MeshFileError(f"{path}: cannot be read as {suffix[1:].upper()}: {reason}") from error
+    for remark in remarks:
+        logger.warning("%s: %s", path, remark)
+    return surface
 
 
 def save(surface: Any, path: str | os.PathLike[str], *, point_data: PointData | None = None) -> None:
