@@ -1,8 +1,8 @@
 """Triangulation of simple polygons, concave ones included, by ear clipping.
 
-A corner is an ear if the triangle of it and its two neighbours lies inside the polygon. Clipping an ear changes only the
-two neighbours, so ears are kept in a queue (Eberly, "Triangulation by ear clipping"): the cost is the number of corners
-times the number of concave corners. Corners are compared with a tolerance for rounding errors of their coordinates.
+A corner is an ear if the triangle of it and its two neighbours lies inside the polygon. Clipping an ear changes only
+the two neighbours, so ears are kept in a queue (Eberly, "Triangulation by ear clipping"): the cost is the number of
+corners times the number of concave corners. Corners are compared with a tolerance for rounding of their coordinates.
 """
 
 from typing import Any, NamedTuple

@@ -12,9 +12,11 @@ import numpy as np
 import numpy.typing as npt
 
 from anisomesh.errors import MeshFileError
-from anisomesh.io import ply, polygons, stl, text_formats, third_party_formats
+from anisomesh.io import polygons
 from anisomesh.io.atomic import atomic_path
 from anisomesh.io.convert import as_surface
+from anisomesh.io.formats import glb, gmsh, medit, obj, off, ply, stl, threemf, vtk_xml
+from anisomesh.io.formats.words import BYTE_ORDER_MARK
 from anisomesh.mesh.surface import Surface
 
 logger = logging.getLogger(__name__)
@@ -22,18 +24,19 @@ logger = logging.getLogger(__name__)
 PointData = Mapping[str, npt.NDArray[Any]]  # arrays (V,) or (V, k) by name
 
 _READERS: dict[str, Callable[[bytes], polygons.PolygonSoup]] = {
-    ".obj": text_formats.read_obj,
-    ".off": text_formats.read_off,
+    ".obj": obj.read_obj,
+    ".off": off.read_off,
     ".ply": ply.read_ply,
     ".stl": stl.read_stl,
-    ".glb": third_party_formats.read_glb,
-    ".mesh": text_formats.read_medit,
+    ".glb": glb.read_glb,
+    ".3mf": threemf.read_3mf,
+    ".vtu": vtk_xml.read_vtu,
+    ".vtp": vtk_xml.read_vtp,
+    ".msh": gmsh.read_msh,
+    ".mesh": medit.read_medit,
 }
-_PATH_READERS: dict[str, Callable[[Path], polygons.PolygonSoup]] = {
-    ".vtu": third_party_formats.read_vtu,
-    ".msh": third_party_formats.read_msh,
-}
-MESH_FORMATS = (*_READERS, *_PATH_READERS)
+_TEXT_FORMATS = (".obj", ".off", ".ply", ".msh", ".mesh")  # may begin with a byte order mark
+MESH_FORMATS = tuple(_READERS)
 """Extensions that :func:`load` and :func:`save` know, in lower case with the dot."""
 
 
@@ -43,7 +46,8 @@ def load(path: str | os.PathLike[str]) -> Surface:
     Parameters
     ----------
     path
-        A file with the extension .obj, .off, .ply, .stl, .glb, .vtu, .msh (Gmsh) or .mesh (MEDIT), in either case.
+        A file with the extension .obj, .off, .ply, .stl, .glb, .3mf, .vtu, .vtp, .msh (Gmsh) or .mesh (MEDIT), in
+        either case.
 
     Returns
     -------
@@ -59,8 +63,11 @@ def load(path: str | os.PathLike[str]) -> Surface:
 
     Notes
     -----
-    Quadrilaterals are split along their shorter diagonal, larger polygons into fans. Lines and volume cells are
-    ignored. STL stores unconnected triangles; corners with equal coordinates are welded, which is logged.
+    Quadrilaterals are split along their shorter diagonal, larger polygons into fans; concave ones by ear clipping.
+    Cells of second order are split at the nodes of their sides if the whole surface is of second order; otherwise cells
+    of higher order are read as polygons of their corners. Lines and volume cells are ignored. Whatever else is left out
+    is named in a warning in the log. STL stores unconnected triangles; corners with equal coordinates are welded, which
+    is logged.
     """
     path = _as_path(path)
     try:
@@ -75,8 +82,9 @@ def load(path: str | os.PathLike[str]) -> Surface:
     if not data.strip():
         raise MeshFileError(f"{path}: the file is empty; expected a mesh")
     try:
-        soup = _READERS[suffix](data) if suffix in _READERS else _PATH_READERS[suffix](path)
-        surface, _, remarks = polygons.as_triangles(soup)
+        if suffix in _TEXT_FORMATS:
+            data = data.removeprefix(BYTE_ORDER_MARK)
+        surface, _, remarks = polygons.as_triangles(_READERS[suffix](data))
     except Exception as error:
         # Our readers raise ValueError with an explanation; other exceptions come from libraries.
         reason = str(error)
@@ -99,8 +107,8 @@ def save(surface: Any, path: str | os.PathLike[str], *, point_data: PointData | 
     path
         The file, with one of the extensions of :func:`load`. An existing file is replaced.
     point_data
-        Arrays (V,) or (V, k) by name. VTU stores all of them, PLY scalars only; arrays that the format cannot store are
-        omitted with a warning in the log.
+        Arrays (V,) or (V, k) by name. VTU and VTP store all of them, PLY scalars only; arrays that the format
+        cannot store are omitted with a warning in the log.
 
     Raises
     ------
@@ -112,7 +120,7 @@ def save(surface: Any, path: str | os.PathLike[str], *, point_data: PointData | 
 
     Notes
     -----
-    OBJ, OFF, PLY, VTU, MSH and MEDIT keep every float64 exactly; STL and GLB round to float32.
+    OBJ, OFF, PLY, 3MF, VTU, VTP, MSH and MEDIT keep every float64 exactly; STL and GLB round to float32.
     """
     path, surface = _as_path(path), as_surface(surface)
     suffix = _known_suffix(path)
@@ -122,7 +130,9 @@ def save(surface: Any, path: str | os.PathLike[str], *, point_data: PointData | 
             raise MeshFileError(f"{path}: {name!r} is not a name of point data")
         data[name] = _point_array(path, name, values, surface.n_points)
     stored = {
-        name: values for name, values in data.items() if suffix == ".vtu" or (suffix == ".ply" and values.ndim == 1)
+        name: values
+        for name, values in data.items()
+        if suffix in (".vtu", ".vtp") or (suffix == ".ply" and values.ndim == 1)
     }
     for name in data.keys() - stored.keys():
         logger.warning("%s: omitted the point data %r, which %s cannot store", path, name, suffix[1:].upper())
@@ -156,23 +166,29 @@ def _point_array(path: Path, name: str, values: Any, n_points: int) -> npt.NDArr
 
 def _write(surface: Surface, path: Path, data: dict[str, npt.NDArray[Any]]) -> None:
     points, faces = surface.points, surface.faces
+    sizes = np.full(len(faces), 3, dtype=np.int64)
     match path.suffix.lower():
         case ".obj":
-            path.write_text(text_formats.obj_text(points, faces))
+            content: str | bytes = obj.obj_text(points, faces)
         case ".off":
-            path.write_text(text_formats.off_text(points, faces))
+            content = off.off_text(points, faces)
         case ".mesh":
-            path.write_text(text_formats.medit_text(points, faces))
+            content = medit.medit_text(points, faces)
         case ".ply":
-            path.write_bytes(ply.ply_bytes(points, faces, data))
+            content = ply.ply_bytes(points, faces, data)
         case ".stl":
-            path.write_bytes(stl.stl_bytes(points, faces))
+            content = stl.stl_bytes(points, faces)
         case ".glb":
-            path.write_bytes(third_party_formats.glb_bytes(points, faces))
+            content = glb.glb_bytes(points, faces)
+        case ".3mf":
+            content = threemf.bytes_of_3mf(points, faces)
         case ".vtu":
-            third_party_formats.write_vtu(path, points, faces, data)
+            content = vtk_xml.vtu_bytes(points, faces.ravel(), sizes, data)
+        case ".vtp":
+            content = vtk_xml.vtp_bytes(points, faces.ravel(), sizes, data)
         case _:
-            third_party_formats.write_msh(path, points, faces)
+            content = gmsh.msh_bytes(points, faces)
+    path.write_bytes(content.encode() if isinstance(content, str) else content)
 
 
 def _known_suffix(path: Path) -> str:
