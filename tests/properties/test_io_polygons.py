@@ -17,9 +17,9 @@ ANNULUS = np.array(  # a square with a square hole, joined by a bridge that the 
     [(0, 0), (4, 0), (4, 4), (0, 4), (0, 0), (1, 1), (1, 3), (3, 3), (3, 1), (1, 1)], dtype=float
 )
 TWO_HOLES = np.array(
-    "0 0 9 0 9 4 0 4 0 2 1 2 2 3 3 2 6 2 7 3 8 2 7 1 6 2 3 2 2 1 1 2 0 2".split(),
+    [[0, 9, 9, 0, 0, 1, 2, 3, 6, 7, 8, 7, 6, 3, 2, 1, 0], [0, 0, 4, 4, 2, 2, 3, 2, 2, 3, 2, 1, 2, 2, 1, 2, 2]],
     dtype=float,
-).reshape(-1, 2)
+).T
 STRAIGHT = np.array([(0, 0), (1, 0), (2, 0), (3, 0), (3, 1), (3, 2), (0, 2), (0, 1)], dtype=float)
 REPEATED = np.array([(0, 0), (3, 0), (3, 0), (3, 3), (2, 3), (2, 1), (2, 1), (1, 1), (1, 3), (0, 3)], dtype=float)
 

@@ -45,6 +45,7 @@ class SurfaceCells:
         self._polygons: list[tuple[Integers, Integers, Integers]] = []
         self._others: Counter[str] = Counter()
         self._n_cells = 0
+        self._n_cut = 0  # polygons of higher order
 
     def take_numbers(self, count: int) -> Integers:
         """Return numbers (count,) for the next cells of the file, counted from 0."""
@@ -75,10 +76,30 @@ class SurfaceCells:
         numbers = self.take_numbers(len(nodes)) if source is None else source
         self._cells.append(_Block(shape, np.asarray(nodes, dtype=np.int64), numbers, nodes_on_sides))
 
-    def add_polygons(self, corners: npt.NDArray[Any], sizes: Integers, source: Integers | None = None) -> None:
-        """Add polygons: concatenated point indices (sum of sizes,), sizes (n,) and numbers in the file (n,)."""
+    def add_polygons(
+        self,
+        corners: npt.NDArray[Any],
+        sizes: Integers,
+        source: Integers | None = None,
+        *,
+        higher_order: bool = False,
+    ) -> None:
+        """Add polygons.
+
+        Parameters
+        ----------
+        corners
+            Indices of points (sum of sizes,) of all polygons, concatenated.
+        sizes
+            Number of corners of each polygon (n,).
+        source
+            Numbers (n,) of the cells in the file; by default the next ones.
+        higher_order
+            Whether nodes of their sides were left out.
+        """
         numbers = self.take_numbers(len(sizes)) if source is None else source
         self._polygons.append((np.asarray(corners, dtype=np.int64), np.asarray(sizes, dtype=np.int64), numbers))
+        self._n_cut += len(sizes) if higher_order else 0
 
     def ignore(self, name: str, count: int = 1) -> None:
         """Count cells of this name that are not part of a surface, such as lines or tetrahedra."""
@@ -100,7 +121,7 @@ class SurfaceCells:
         split = not polygons and all(
             block.nodes_on_sides and (block.shape, block.nodes.shape[1]) in _PARTS for block in cells
         )
-        n_higher = 0
+        n_higher = self._n_cut
         for shape, nodes, source, _ in cells:
             n_higher += len(nodes) if nodes.shape[1] > N_CORNERS[shape] else 0
             parts = _PARTS[shape, nodes.shape[1]] if split else [list(range(N_CORNERS[shape]))]

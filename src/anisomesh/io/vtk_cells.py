@@ -10,7 +10,7 @@ import numpy.typing as npt
 from anisomesh.io.cells import N_CORNERS, Shape, SurfaceCells, strip_triangles
 from anisomesh.io.polygons import Integers
 
-TRIANGLE, STRIP, POLYGON, PIXEL, QUAD = 5, 6, 7, 8, 9
+TRIANGLE, STRIP, POLYGON, PIXEL, QUAD, QUADRATIC_POLYGON = 5, 6, 7, 8, 9, 36
 
 _SHAPES: dict[int, Shape] = {
     **dict.fromkeys((TRIANGLE, 22, 34, 61, 69, 76), "triangle"),
@@ -73,6 +73,8 @@ def _add_surface_cells(cells: SurfaceCells, cell_type: int, nodes: Integers, sou
         cells.add("triangle", np.concatenate(triangles), numbers)
     elif cell_type == POLYGON:
         cells.add_polygons(nodes.ravel(), np.full(n, size), source)
+    elif cell_type == QUADRATIC_POLYGON:
+        cells.add_polygons(nodes[:, : size // 2].ravel(), np.full(n, size // 2), source, higher_order=True)
     elif cell_type in _SHAPES:
         shape = _SHAPES[cell_type]
         if size < N_CORNERS[shape]:
