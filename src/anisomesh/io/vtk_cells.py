@@ -12,12 +12,12 @@ from anisomesh.io.polygons import Integers
 
 TRIANGLE, STRIP, POLYGON, PIXEL, QUAD, QUADRATIC_POLYGON = 5, 6, 7, 8, 9, 36
 
-_SHAPES: dict[int, Shape] = {
+_VTK_SHAPES: dict[int, Shape] = {
     **dict.fromkeys((TRIANGLE, 22, 34, 61, 69, 76), "triangle"),
     **dict.fromkeys((PIXEL, QUAD, 23, 28, 30, 62, 70, 77), "quad"),
 }
 _NODES_ON_SIDES = (22, 23, 28, 30, 34, 69, 70)  # the others of higher order have control points or another order
-_OTHERS = {
+_VTK_OTHERS = {
     **dict.fromkeys((0, 1, 2), "vertex"),
     **dict.fromkeys((3, 4, 21, 35, 51, 60, 68, 75), "line"),
     **dict.fromkeys((10, 24, 55, 64, 71, 78), "tetra"),
@@ -58,8 +58,8 @@ def add_vtk_cells(
     keys, kind = np.unique(np.stack([types, sizes], axis=1), axis=0, return_inverse=True)
     for k, (cell_type, size) in enumerate(keys.tolist()):
         chosen = np.flatnonzero(kind.ravel() == k)
-        if cell_type in _OTHERS:
-            cells.ignore(_OTHERS[cell_type], len(chosen))
+        if cell_type in _VTK_OTHERS:
+            cells.ignore(_VTK_OTHERS[cell_type], len(chosen))
         else:
             nodes = connectivity[(ends[chosen] - size)[:, None] + np.arange(size)]
             _add_surface_cells(cells, cell_type, nodes, source[chosen])
@@ -75,8 +75,8 @@ def _add_surface_cells(cells: SurfaceCells, cell_type: int, nodes: Integers, sou
         cells.add_polygons(nodes.ravel(), np.full(n, size), source)
     elif cell_type == QUADRATIC_POLYGON:
         cells.add_polygons(nodes[:, : size // 2].ravel(), np.full(n, size // 2), source, higher_order=True)
-    elif cell_type in _SHAPES:
-        shape = _SHAPES[cell_type]
+    elif cell_type in _VTK_SHAPES:
+        shape = _VTK_SHAPES[cell_type]
         if size < N_CORNERS[shape]:
             raise ValueError(f"malformed: cell {source[0]} of type {cell_type} has {size} points")
         nodes = nodes[:, [0, 1, 3, 2]] if cell_type == PIXEL and size == 4 else nodes

@@ -21,7 +21,7 @@ _WIDTHS = {"SCALAR": 1, "VEC2": 2, "VEC3": 3, "VEC4": 4}
 _TRIANGLES, _STRIP, _FAN = 4, 5, 6  # modes of a primitive; lower ones are points and lines
 _COMPRESSED = ("KHR_draco_mesh_compression", "EXT_meshopt_compression")
 _JSON, _BINARY = b"JSON", b"BIN\0"  # kinds of chunks
-_DEEPEST = 1000  # of nodes in nodes
+_DEEPEST = 200  # of nodes in nodes
 _MAX_INSTANCES = 100_000
 _MAX_SPARSE = 10_000_000  # rows of an accessor that are zero but for some
 

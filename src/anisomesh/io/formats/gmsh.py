@@ -20,7 +20,7 @@ from anisomesh.io.polygons import Integers, PolygonSoup
 # Number of nodes by type of element; of triangles and quadrilaterals of third order and more, corners come first.
 _TRIANGLES = {2: 3, 9: 6, 20: 9, 21: 10, 22: 12, 23: 15, 24: 15, 25: 21, 42: 28, 43: 36, 44: 45, 45: 55, 46: 66}
 _QUADS = {3: 4, 10: 9, 16: 8, 36: 16, 37: 25, 38: 36, 39: 12, 40: 16, 41: 20, 47: 49, 48: 64, 49: 81, 50: 100, 51: 121}
-_OTHERS: dict[str, dict[int, int]] = {
+_GMSH_OTHERS: dict[str, dict[int, int]] = {
     "point": {15: 1},
     "line": {1: 2, 8: 3, 26: 4, 27: 5, 28: 6, 62: 7, 63: 8, 64: 9, 65: 10, 66: 11},
     "tetra": {4: 4, 11: 10, 29: 20, 30: 35, 31: 56, 71: 84, 72: 120, 73: 165, 74: 220, 75: 286},
@@ -28,9 +28,9 @@ _OTHERS: dict[str, dict[int, int]] = {
     "prism": {6: 6, 13: 18, 18: 15, 90: 40, 91: 75, 106: 126, 107: 196, 108: 288, 109: 405, 110: 550},
     "pyramid": {7: 5, 14: 14, 19: 13},
 }
-_SHAPES: dict[int, Shape] = {**dict.fromkeys(_TRIANGLES, "triangle"), **dict.fromkeys(_QUADS, "quad")}
-_NAMES = {kind: name for name, kinds in _OTHERS.items() for kind in kinds}
-_N_NODES = {**_TRIANGLES, **_QUADS, **{kind: n for kinds in _OTHERS.values() for kind, n in kinds.items()}}
+_GMSH_SHAPES: dict[int, Shape] = {**dict.fromkeys(_TRIANGLES, "triangle"), **dict.fromkeys(_QUADS, "quad")}
+_NAMES = {kind: name for name, kinds in _GMSH_OTHERS.items() for kind in kinds}
+_N_NODES = {**_TRIANGLES, **_QUADS, **{kind: n for kinds in _GMSH_OTHERS.values() for kind, n in kinds.items()}}
 
 
 def read_msh(data: bytes) -> PolygonSoup:
@@ -194,8 +194,8 @@ def _check_type(kind: int) -> None:
 
 def _add(cells: SurfaceCells, kind: int, table: _TagTable, tags: Integers, source: Integers) -> None:
     """Add elements of a type, given by the tags of their nodes (n, k)."""
-    if kind in _SHAPES:
-        shape = _SHAPES[kind]
+    if kind in _GMSH_SHAPES:
+        shape = _GMSH_SHAPES[kind]
         nodes_on_sides = _N_NODES[kind] <= 2 * N_CORNERS[shape] + 1
         cells.add(shape, table.indices(tags), source, nodes_on_sides=nodes_on_sides)
     else:

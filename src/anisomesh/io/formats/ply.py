@@ -44,7 +44,7 @@ class _Element:
     properties: tuple[_Property, ...]
 
 
-class _Column(NamedTuple):
+class _PropertyValues(NamedTuple):
     """The values of a property in all rows, concatenated, and how many each row has."""
 
     values: npt.NDArray[np.float64] | Integers
@@ -79,7 +79,7 @@ def read_ply(data: bytes) -> PolygonSoup:
     return cells.soup(points)
 
 
-def _add(cells: SurfaceCells, name: str, corners: _Column) -> None:
+def _add(cells: SurfaceCells, name: str, corners: _PropertyValues) -> None:
     """Add faces, or strips that are ended by -1; a strip counts as one face."""
     values = corners.values.astype(np.int64)
     if name == "face":
@@ -158,7 +158,7 @@ class _TextBody:
         self.words = words
         self.position = 0
 
-    def read(self, element: _Element, wanted: Iterable[str]) -> dict[str, _Column]:
+    def read(self, element: _Element, wanted: Iterable[str]) -> dict[str, _PropertyValues]:
         """Read an element; return the properties with these names."""
         if not any(prop.count_type for prop in element.properties):
             return self._table(element, wanted)
@@ -182,7 +182,7 @@ class _TextBody:
         kinds = {prop.name: prop.type for prop in element.properties}
         return {name: self._column(kinds[name], *found) for name, found in places.items()}
 
-    def _column(self, kind: str, starts: list[int], sizes: list[int]) -> _Column:
+    def _column(self, kind: str, starts: list[int], sizes: list[int]) -> _PropertyValues:
         words = self.words
         flat = [word for start, size in zip(starts, sizes, strict=True) for word in words[start : start + size]]
         values: npt.NDArray[np.float64] | Integers
@@ -190,9 +190,9 @@ class _TextBody:
             values = np.array([float(word) for word in flat], dtype=np.float64)
         else:
             values = np.array([int(word) for word in flat], dtype=np.int64)
-        return _Column(values, np.array(sizes, dtype=np.int64))
+        return _PropertyValues(values, np.array(sizes, dtype=np.int64))
 
-    def _table(self, element: _Element, wanted: Iterable[str]) -> dict[str, _Column]:
+    def _table(self, element: _Element, wanted: Iterable[str]) -> dict[str, _PropertyValues]:
         """Read an element of scalars."""
         width = len(element.properties)
         count = element.count * width
@@ -206,7 +206,7 @@ class _TextBody:
             raise ValueError(f"element {element.name}: {error}") from None
         names = [prop.name for prop in element.properties]
         ones = np.ones(element.count, dtype=np.int64) if width else np.zeros(0, dtype=np.int64)
-        return {name: _Column(table[:, names.index(name)], ones) for name in wanted}
+        return {name: _PropertyValues(table[:, names.index(name)], ones) for name in wanted}
 
 
 class _BinaryBody:
@@ -217,14 +217,14 @@ class _BinaryBody:
         self.position = start
         self.order = order
 
-    def read(self, element: _Element, wanted: Iterable[str]) -> dict[str, _Column]:
+    def read(self, element: _Element, wanted: Iterable[str]) -> dict[str, _PropertyValues]:
         """Read an element; return the properties with these names."""
         if not element.properties:
             return {}
         columns = self._equal_rows(element, wanted)
         return self._any_rows(element, wanted) if columns is None else columns
 
-    def _equal_rows(self, element: _Element, wanted: Iterable[str]) -> dict[str, _Column] | None:
+    def _equal_rows(self, element: _Element, wanted: Iterable[str]) -> dict[str, _PropertyValues] | None:
         """Read all rows as one array if their lists have the sizes of the first row's; else return None."""
         fields: list[tuple[str, str] | tuple[str, str, tuple[int]]] = []
         sizes, at = {}, self.position
@@ -249,10 +249,10 @@ class _BinaryBody:
         columns = {}
         for name in wanted:
             lengths = np.full(element.count, sizes.get(name, 1), dtype=np.int64)
-            columns[name] = _Column(_native(rows[f"value {name}"].ravel()), lengths)
+            columns[name] = _PropertyValues(_native(rows[f"value {name}"].ravel()), lengths)
         return columns
 
-    def _any_rows(self, element: _Element, wanted: Iterable[str]) -> dict[str, _Column]:
+    def _any_rows(self, element: _Element, wanted: Iterable[str]) -> dict[str, _PropertyValues]:
         """Read row by row."""
         chunks: dict[str, tuple[list[bytes], list[int]]] = {name: ([], []) for name in wanted}
         at = self.position
@@ -271,7 +271,9 @@ class _BinaryBody:
         self.position = at
         kinds = {prop.name: self.order + prop.type for prop in element.properties}
         return {
-            name: _Column(_native(np.frombuffer(b"".join(found), dtype=kinds[name])), np.array(lengths, dtype=np.int64))
+            name: _PropertyValues(
+                _native(np.frombuffer(b"".join(found), dtype=kinds[name])), np.array(lengths, dtype=np.int64)
+            )
             for name, (found, lengths) in chunks.items()
         }
 

@@ -24,7 +24,8 @@ from anisomesh.io.polygons import Integers, PolygonSoup
 _ROOT = "3D/3dmodel.model"
 _MODEL_TYPE = "http://schemas.microsoft.com/3dmanufacturing/2013/01/3dmodel"
 _CORE = "http://schemas.microsoft.com/3dmanufacturing/core/2015/02"
-_MAX_INSTANCES = 100_000
+_DEEPEST_COMPONENTS = 100
+_MAX_OBJECTS = 100_000
 _LARGEST_SHARE = 1_100  # uncompressed bytes per byte of an entry; zlib reaches 1,032
 _DATE = (1980, 1, 1, 0, 0, 0)  # of all entries, so that the same mesh gives the same file
 
@@ -87,7 +88,7 @@ class _Build:
     def add(self, key: tuple[str, str], matrix: npt.NDArray[np.float64], depth: int) -> None:
         """Add an object, given by its part and number, moved by a matrix (4, 3) that is multiplied from the right."""
         self._n_instances += 1
-        if depth > 100 or self._n_instances > _MAX_INSTANCES:
+        if depth > _DEEPEST_COMPONENTS or self._n_instances > _MAX_OBJECTS:
             raise ValueError("malformed: its objects contain each other")
         found = self.model(key[0]).objects.get(key[1])
         if found is None:
