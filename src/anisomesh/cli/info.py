@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from anisomesh.cli.job import read
-from anisomesh.cli.report import as_json, counted, describe_validity, table
+from anisomesh.cli.report import as_json, counted, describe_validity, hints, table
 
 if TYPE_CHECKING:
     from anisomesh.mesh.surface import Surface
@@ -51,6 +51,7 @@ def describe(surface: Surface) -> dict[str, Any]:
             "points": prepared.surface.n_points,
             "faces": prepared.surface.n_faces,
         },
+        "hints": hints(prepared.surface),
     }
 
 
@@ -95,4 +96,5 @@ def _text(facts: dict[str, Any]) -> str:
     if prepare["changes"]:
         size = f"{counted(prepare['points'], 'point')}, {counted(prepare['faces'], 'face')}"
         rows.append(("prepared", size))
+    rows += [("hint", hint) for hint in facts["hints"]]
     return f"{facts['file']}\n{table(rows)}"

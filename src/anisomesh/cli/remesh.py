@@ -18,7 +18,7 @@ from anisomesh.cli.arguments import (
 )
 from anisomesh.cli.job import Outputs, read, run_remesh
 from anisomesh.cli.progress import progress
-from anisomesh.cli.report import as_json, summary
+from anisomesh.cli.report import as_json, hints, summary
 
 
 @takes_remesh_options(*REMESH_OPTIONS)
@@ -38,6 +38,13 @@ def command(
         Path | None,
         typer.Option(metavar="FILE", help="Creases to keep: a text file, two vertex numbers per line, from 0."),
     ] = None,
+    weld: Annotated[
+        str | None,
+        typer.Option(
+            metavar="LENGTH",
+            help="Join points of the input up to this distance, in model units or % of the diagonal; auto: 0.001%.",
+        ),
+    ] = None,
     report: Annotated[Path | None, typer.Option(metavar="JSON", help="Write the report to this file.")] = None,
     rvd: Annotated[
         Path | None, typer.Option(metavar="FILE", help="Write the Voronoi cells on the surface: .vtu or .obj.")
@@ -54,6 +61,7 @@ def command(
     if (n_vertices, ratio, max_error).count(None) != 2:
         raise typer.BadParameter("give one of -n (number of vertices), --ratio and --max-error")
     error = None if max_error is None else Length.parse(max_error, "--max-error")
+    gap = None if weld in (None, "auto") else Length.parse(weld, "--weld")
     outputs = Outputs(mesh=out, report=report, rvd=rvd, picture=picture)
     weights = options.get("weights")
     outputs.check(source, features, None if weights is None else Path(weights))
@@ -65,7 +73,10 @@ def command(
             options["features"] = load_pairs(features)
         options |= {"n_vertices": n_vertices, "ratio": ratio}
         options["max_error"] = None if error is None else error.on(surface)
+        if weld is not None:
+            options["weld_tolerance"] = "auto" if gap is None else gap.on(surface)
         result, facts = run_remesh(surface, display, name=str(source), load_seconds=seconds, **options)
+        facts["hints"] = hints(result.prepared)
         facts["options"]["features"] = None if features is None else str(features)
         outputs.write(result, facts, display)
     if json_:
