@@ -7,7 +7,8 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from anisomesh.cli.job import read
+from anisomesh.cli.arguments import InputFormat
+from anisomesh.cli.job import check_input_format, read
 from anisomesh.cli.report import as_json, counted, describe_validity, hints, table
 
 if TYPE_CHECKING:
@@ -15,11 +16,13 @@ if TYPE_CHECKING:
 
 
 def command(
-    source: Annotated[Path, typer.Argument(metavar="IN", help="Mesh file: OBJ, OFF, PLY, STL, GLB, VTU, ...")],
+    source: Annotated[Path, typer.Argument(metavar="IN", help="Mesh file: OBJ, OFF, PLY, STL, GLB, 3MF, VTU, ...")],
+    input_format: InputFormat = None,
     json_: Annotated[bool, typer.Option("--json", help="Print the facts as JSON and nothing else.")] = False,
 ) -> None:
-    """Describe a mesh: size, topology, defects, and the repairs before a remesh."""
-    facts = describe(read(source)[0]) | {"file": str(source)}
+    """Describe a mesh: size, topology, defects, and the repairs before a remesh; - is standard input."""
+    check_input_format(source, input_format)
+    facts = describe(read(source, input_format)[0]) | {"file": str(source)}
     typer.echo(as_json(facts) if json_ else _text(facts))
 
 
