@@ -14,7 +14,6 @@ from anisomesh.features.tagged import tagged_edges
 from anisomesh.mesh.surface import Surface
 from anisomesh.metric.tensors import validate_metric
 from anisomesh.options import RemeshOptions
-from anisomesh.repair.near_points import weld_distance
 from anisomesh.repair.prepare import Prepared, prepare
 
 _LARGEST_DENSITY = 1e30  # and inverse of the smallest, so that energies are far from overflow
@@ -52,8 +51,7 @@ def prepared_input(surface: Surface, options: RemeshOptions) -> PreparedInput:
     OptionError
         If densities are not positive, one per point, or features are not edges of the input.
     """
-    tolerance = weld_distance(surface, options.weld_tolerance)
-    prepared = prepare(surface, weld_tolerance=tolerance)
+    prepared = prepare(surface, weld_tolerance=options.weld_tolerance)
     tensors = density = None
     if not isinstance(options.metric, str) and not callable(options.metric):
         given = _at_prepared("metric", options.metric, (surface.n_points, 3, 3), prepared, MetricError)
@@ -68,7 +66,7 @@ def prepared_input(surface: Surface, options: RemeshOptions) -> PreparedInput:
             )
     tagged = np.zeros(len(prepared.surface.edges), dtype=bool)
     if options.features is not None:
-        tagged = tagged_edges(surface, options.features, prepared.surface, tolerance)
+        tagged = tagged_edges(surface, options.features, prepared.surface, options.weld_tolerance)
     return PreparedInput(prepared=prepared, tensors=tensors, density=density, tagged=tagged)
 
 

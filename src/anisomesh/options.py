@@ -81,8 +81,7 @@ class RemeshOptions:
     embedding_iterations
         Bound on the local/global steps of the direct embedding.
     weld_tolerance
-        Points of the input up to this distance (model units) are merged; ``"auto"`` is 1e-5 of the bounding-box
-        diagonal.
+        Points of the input up to this distance (model units) are merged; ``"auto"`` is 1e-5 of the diagonal.
     feature_angle
         Edges of the input whose dihedral angle deviates from flat by more degrees than this are creases, which edges of
         the result follow where there are enough vertices, and across which no curvature is measured; 180 for none. The
@@ -139,8 +138,8 @@ class RemeshOptions:
         """Turn numbers of any type, such as NumPy's, into Python's."""
         for name in (*_NUMBERS, *_OPTIONAL_NUMBERS):
             value = getattr(self, name)
-            automatic = isinstance(value, str) and (name, value) == ("weld_tolerance", "auto")
-            if not automatic and not (value is None and name in _OPTIONAL_NUMBERS):
+            is_word = isinstance(value, str) and (name, value) == ("weld_tolerance", "auto")
+            if not (is_word or (value is None and name in _OPTIONAL_NUMBERS)):
                 object.__setattr__(self, name, real_number(name, value))
         for name, low in _LEAST.items():
             if name == "max_iterations" and self.max_iterations is None:

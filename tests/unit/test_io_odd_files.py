@@ -84,6 +84,7 @@ READ = {  # name: content and what the log says
     "trailing.stl": (BINARY_STL + b"\x01" * 20, "left out 20 byte(s) behind the 4 triangles"),
     "padded.stl": (BINARY_STL + b"\0" * 100, "left out 100 byte(s)"),
     "no end.stl": (f"solid a\n{FACETS}", "it has no endsolid after its 4 facets"),
+    "no end.mesh": (MEDIT.removesuffix("End\n"), "it has no End after its sections"),
     "long name.stl": (f"solid {'n' * 5000}\n{FACETS}endsolid\n", ""),
 }
 

@@ -12,7 +12,7 @@ from anisomesh.mesh.surface import Surface
 
 AUTO_WELD = 1e-5  # of the bounding-box diagonal: above the rounding of files of six digits, below any detail; heuristic
 _MOST_OF_EDGE = 0.1  # of the shortest edge at a point, up to which another is near, not a neighbour; heuristic
-_NEAREST = 4  # points that are looked at
+_N_NEIGHBOURS = 4  # points that are looked at
 
 
 def weld_distance(surface: Surface, tolerance: float | Literal["auto"]) -> float:
@@ -33,7 +33,9 @@ def count_near_boundary_points(surface: Surface) -> int:
     shortest = np.full(surface.n_points, math.inf)
     np.minimum.at(shortest, surface.edges, surface.edge_lengths[:, None])
     points, limit = surface.points[boundary], AUTO_WELD * surface.diagonal
-    distance, other = cKDTree(points).query(points, k=_NEAREST, distance_upper_bound=math.nextafter(limit, math.inf))
+    distance, other = cKDTree(points).query(
+        points, k=_N_NEIGHBOURS, distance_upper_bound=math.nextafter(limit, math.inf)
+    )
     found = np.isfinite(distance) & (distance > 0.0)
     edge = np.append(shortest[boundary], 0.0)  # where there are fewer points the tree returns their number
     found &= distance < _MOST_OF_EDGE * np.minimum(edge[:-1, None], edge[other])

@@ -54,7 +54,8 @@ def read_medit(data: bytes) -> PolygonSoup:
             raise ValueError(f"its nodes have an order of their own ({name.decode()}); save it in the standard order")
         elif name.startswith(_VOLUMES):
             cells.ignore(name.decode(errors="replace"))
-    return cells.soup(np.concatenate(points))
+    remarks = () if b"End" in tokens[-1:] else ("it has no End after its sections; check that none is missing",)
+    return cells.soup(np.concatenate(points), remarks)
 
 
 def medit_text(points: Points, faces: Faces) -> str:
