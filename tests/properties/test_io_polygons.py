@@ -206,3 +206,24 @@ def test_odd_parts_are_left_out_and_named():
     assert "the first of them 3" in remarks[1]
     with pytest.raises(ValueError, match="point 3"):
         as_triangles(PolygonSoup.from_array(points, np.array([[0, 1, 3]])))
+
+
+@pytest.mark.parametrize("noise", [0.0, 1e-13, 1e-9, 1e-6])
+@pytest.mark.parametrize("offset", [0.0, 1e6])
+def test_straight_sides_with_many_corners_give_no_slivers(noise, offset):
+    """Corners on the sides of a rectangle, exactly or up to rounding: every triangle has a height above the noise."""
+    rng = np.random.default_rng(0)
+    along = np.linspace(0, 4, 9)
+    xy = np.concatenate(
+        [
+            np.stack([along[:-1], 0 * along[:-1]], 1),
+            [(4, 0), (4, 1)],
+            np.stack([along[::-1][1:-1], 1 + 0 * along[1:-1]], 1),
+            [(0, 1)],
+        ]
+    )
+    xy = xy + offset + noise * rng.uniform(-1, 1, xy.shape)
+    made = triangles_of(np.pad(xy, ((0, 0), (0, 1))), np.arange(len(xy)))
+    areas = signed_areas(xy - offset, made.faces)
+    assert areas.sum() == pytest.approx(4, abs=1e-5)
+    assert areas.min() > 0.2

@@ -1,8 +1,9 @@
 """Triangulation of simple polygons, concave ones included, by ear clipping.
 
 A corner is an ear if the triangle of it and its two neighbours lies inside the polygon. Clipping an ear changes only
-the two neighbours, so ears are kept in a queue (Eberly, "Triangulation by ear clipping"): the cost is the number of
-corners times the number of concave corners. Corners are compared with a tolerance for rounding of their coordinates.
+the two neighbours, so ears are kept in queues (Eberly, "Triangulation by ear clipping"): the cost is the number of
+corners times the number of concave corners. Thin ears wait for the others, since corners on a straight side are rarely
+exactly on it. Corners are compared with a tolerance for rounding of their coordinates.
 """
 
 from typing import Any, NamedTuple
@@ -11,6 +12,7 @@ import numpy as np
 
 from .compiled import kernel
 
+_THIN = 1e-3  # twice the area of an ear over the square of its longest side; heuristic
 _ROUNDING = 16.0 * np.finfo(np.float64).eps  # of a signed area, relative to extent times length
 
 
@@ -28,7 +30,7 @@ class Corners(NamedTuple):
     concave
         Corners that had no clearly convex angle (n,).
     queue
-        Ears and their stamps (3 n, 2).
+        Ears and their stamps (3 n, 2): from the beginning those of good shape, from the end thin ones.
     """
 
     xy: Any
@@ -120,12 +122,42 @@ def _without_ears(corners, n_concave, start):
 
 
 @kernel
-def _queue_ear(corners, n_concave, b, end):
-    """Enter corner b into the queue if it is an ear, and return the new end of the queue."""
-    if _is_ear(corners, n_concave, b, True):
+def _is_thin(corners, b):
+    """Return whether the triangle of corner b and its neighbours is thin."""
+    xy, a, c = corners.xy, corners.before[b], corners.after[b]
+    longest = 0.0
+    for p, q in ((a, b), (b, c), (c, a)):
+        longest = max(longest, (xy[p, 0] - xy[q, 0]) ** 2 + (xy[p, 1] - xy[q, 1]) ** 2)
+    return _turn(xy, a, b, c) < _THIN * longest
+
+
+@kernel
+def _queue_ear(corners, n_concave, b, end, thin):
+    """Enter corner b into a queue if it is an ear; return where good ears end and thin ones begin."""
+    if not _is_ear(corners, n_concave, b, True):
+        return end, thin
+    if _is_thin(corners, b):
+        thin -= 1
+        corners.queue[thin, 0], corners.queue[thin, 1] = b, corners.stamp[b]
+    else:
         corners.queue[end, 0], corners.queue[end, 1] = b, corners.stamp[b]
-        return end + 1
-    return end
+        end += 1
+    return end, thin
+
+
+@kernel
+def _next_ear(corners, begin, end, thin):
+    """Return a queued ear, -1 if there is none, and where good and thin ears begin after it."""
+    queue, stamp, last = corners.queue, corners.stamp, len(corners.queue)
+    while begin < end and stamp[queue[begin, 0]] != queue[begin, 1]:
+        begin += 1
+    if begin < end:
+        return queue[begin, 0], begin + 1, thin
+    while thin < last and stamp[queue[thin, 0]] != queue[thin, 1]:
+        thin += 1
+    if thin < last:
+        return queue[thin, 0], begin, thin + 1
+    return -1, begin, thin
 
 
 @kernel
@@ -137,18 +169,14 @@ def _clip_polygon(corners, n, triangles):
         if _turn(corners.xy, (k - 1) % n, k, (k + 1) % n) <= 0.0:
             corners.concave[n_concave] = k
             n_concave += 1
-    begin = end = 0
+    begin, end, thin = 0, 0, len(corners.queue)
     for k in range(n):
-        end = _queue_ear(corners, n_concave, k, end)
+        end, thin = _queue_ear(corners, n_concave, k, end, thin)
     forced = False
     a = 0
     for row in range(n - 2):
-        while begin < end and corners.stamp[corners.queue[begin, 0]] != corners.queue[begin, 1]:
-            begin += 1
-        if begin < end:
-            b = corners.queue[begin, 0]
-            begin += 1
-        else:
+        b, begin, thin = _next_ear(corners, begin, end, thin)
+        if b < 0:
             b, by_force = _without_ears(corners, n_concave, a)
             forced = forced or by_force
         a, c = corners.before[b], corners.after[b]
@@ -156,8 +184,8 @@ def _clip_polygon(corners, n, triangles):
         corners.after[a], corners.before[c], corners.stamp[b] = c, a, -1
         corners.stamp[a] += 1
         corners.stamp[c] += 1
-        end = _queue_ear(corners, n_concave, a, end)
-        end = _queue_ear(corners, n_concave, c, end)
+        end, thin = _queue_ear(corners, n_concave, a, end, thin)
+        end, thin = _queue_ear(corners, n_concave, c, end, thin)
     return forced
 
 

@@ -198,8 +198,7 @@ def _relative_corners(soup: PolygonSoup, chosen: Integers, first: Integers) -> n
     sizes = soup.sizes[chosen]
     start = np.repeat(np.cumsum(sizes) - sizes, sizes)
     rows = soup.corners[np.repeat(first[chosen], sizes) + np.arange(len(start)) - start]
-    largest = np.abs(soup.points).max() or 1.0
-    shape = soup.points[rows] / largest
+    shape = np.ldexp(soup.points[rows], -np.frexp(np.abs(soup.points).max())[1])  # so that differences do not overflow
     shape = shape - shape[start]
     extent = np.maximum.reduceat(np.abs(shape).max(axis=1), np.cumsum(sizes) - sizes) if len(sizes) else np.ones(0)
     scaled: npt.NDArray[np.float64] = shape / np.repeat(np.where(extent > 0, extent, 1.0), sizes)[:, None]

@@ -20,6 +20,7 @@ _COMPONENTS = {5120: "i1", 5121: "u1", 5122: "i2", 5123: "u2", 5125: "u4", 5126:
 _WIDTHS = {"SCALAR": 1, "VEC2": 2, "VEC3": 3, "VEC4": 4}
 _TRIANGLES, _STRIP, _FAN = 4, 5, 6  # modes of a primitive; lower ones are points and lines
 _COMPRESSED = ("KHR_draco_mesh_compression", "EXT_meshopt_compression")
+_COPIES = "EXT_mesh_gpu_instancing"
 _JSON, _BINARY = b"JSON", b"BIN\0"  # kinds of chunks
 _DEEPEST = 200  # of nodes in nodes
 _MAX_INSTANCES = 100_000
@@ -76,7 +77,9 @@ class _Scene:
         else:
             for mesh in range(len(self._document.get("meshes", []))):
                 self._add_mesh(mesh, np.eye(4))
-        return self._cells.soup(np.concatenate(self._points))
+        used = _COPIES in self._document.get("extensionsUsed", [])
+        remarks = (f"left out copies of its meshes that {_COPIES} makes",) if used else ()
+        return self._cells.soup(np.concatenate(self._points), remarks)
 
     def _add_node(self, index: int, above: npt.NDArray[np.float64], depth: int) -> None:
         self._n_instances += 1

@@ -26,7 +26,10 @@ def read_obj(data: bytes) -> PolygonSoup:
     lines = re.sub(rb"\\\r?\n", b" ", data).splitlines()
     kinds = np.array([line[:2].replace(b"\t", b" ") for line in map(bytes.lstrip, lines)], dtype="S2")
     point_lines = np.flatnonzero(kinds == b"v ")
-    face_lines = np.flatnonzero((kinds == b"f ") | (kinds == b"fo"))  # fo: f in files of version 2
+    is_face = kinds == b"f "
+    for k in np.flatnonzero(kinds == b"fo"):
+        is_face[k] = lines[k].split(None, 1)[0] == b"fo"  # in files of version 2
+    face_lines = np.flatnonzero(is_face)
     truncated = np.flatnonzero((kinds == b"v") | (kinds == b"f"))
     if len(truncated):
         raise ValueError(f"line {truncated[0] + 1} is cut off: {lines[truncated[0]][:40]!r}")
