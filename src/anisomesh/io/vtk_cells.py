@@ -12,6 +12,8 @@ from anisomesh.io.polygons import Integers
 
 TRIANGLE, STRIP, POLYGON, PIXEL, QUAD, QUADRATIC_POLYGON = 5, 6, 7, 8, 9, 36
 
+_N_TYPES = 256  # of one byte
+
 _VTK_SHAPES: dict[int, Shape] = {
     **dict.fromkeys((TRIANGLE, 22, 34, 61, 69, 76), "triangle"),
     **dict.fromkeys((PIXEL, QUAD, 23, 28, 30, 62, 70, 77), "quad"),
@@ -53,11 +55,15 @@ def add_vtk_cells(
     sizes = np.diff(ends, prepend=0)
     if len(types) != len(ends) or (sizes < 0).any() or (len(ends) and ends[-1] > len(connectivity)):
         raise ValueError("malformed: the offsets of the cells do not fit their points and types")
+    unknown = np.flatnonzero((types < 0) | (types >= _N_TYPES))
+    if len(unknown):
+        raise ValueError(f"malformed: cell {unknown[0]} is of type {types[unknown[0]]}; expected 0 to {_N_TYPES - 1}")
     connectivity = np.asarray(connectivity, dtype=np.int64)
     source = cells.take_numbers(len(types))
-    keys, kind = np.unique(np.stack([types, sizes], axis=1), axis=0, return_inverse=True)
-    for k, (cell_type, size) in enumerate(keys.tolist()):
-        chosen = np.flatnonzero(kind.ravel() == k)
+    kind = sizes * _N_TYPES + types
+    for key in np.unique(kind).tolist():
+        size, cell_type = divmod(key, _N_TYPES)
+        chosen = np.flatnonzero(kind == key)
         if cell_type in _VTK_OTHERS:
             cells.ignore(_VTK_OTHERS[cell_type], len(chosen))
         else:
