@@ -3,11 +3,13 @@
 import logging
 import time
 
+import meshio
 import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from anisomesh.io.formats.vtk_xml import vtp_bytes
 from anisomesh.io.meshes import load
 from anisomesh.io.polygons import PolygonSoup, as_triangles, triangulate
 from conftest import examples
@@ -227,3 +229,26 @@ def test_straight_sides_with_many_corners_give_no_slivers(noise, offset):
     areas = signed_areas(xy - offset, made.faces)
     assert areas.sum() == pytest.approx(4, abs=1e-5)
     assert areas.min() > 0.2
+
+
+@pytest.mark.parametrize("suffix", [".obj", ".off", ".ply", ".vtu", ".vtp", ".msh", ".mesh"])
+def test_concave_quadrilaterals_and_unused_points_of_all_formats(tmp_path, suffix, caplog):
+    """A dart beside a square, in every format that holds quadrilaterals, and a point without coordinates."""
+    outline = [(0, 0, 0), (4, -1, 0), (1, 0, 0), (4, 1, 0), (9, 0, 0), (9, 1, 0), (4, 1, 0), (4, 0, 0)]
+    points = np.array([*outline, [np.nan] * 3])
+    quads = np.array([[1, 2, 3, 0], [7, 4, 5, 6]])
+    path = tmp_path / f"a{suffix}"
+    if suffix == ".vtp":
+        path.write_bytes(vtp_bytes(points, quads, np.array([4, 4]), {}))
+    elif suffix == ".off":
+        rows = [*map("{} {} {}".format, *points.T), *map("4 {} {} {} {}".format, *quads.T)]
+        path.write_text("\n".join(["OFF", "9 2 0", *rows]))
+    else:
+        form = {".mesh": "medit", ".msh": "gmsh22"}.get(suffix, suffix[1:])
+        meshio.Mesh(points, [("quad", quads)]).write(path, file_format=form)
+    surface = load(path)
+    assert surface.n_points == 9
+    assert np.isfinite(surface.points).all()
+    assert surface.area == pytest.approx(1 + 5)
+    assert np.ptp(surface.face_normals[:2, 2]) == 0
+    assert "1 point(s) that no face uses" in caplog.text

@@ -14,7 +14,8 @@ Shape = Literal["triangle", "quad"]
 N_CORNERS: dict[Shape, int] = {"triangle": 3, "quad": 4}
 
 # Parts of second-order cells by shape and number of nodes: corners first, then the nodes of the sides in order, then
-# the middle. Schroeder, Martin, Lorensen, "The Visualization Toolkit", 4th ed., figure 5-4, and Gmsh's manual agree.
+# the middle, in VTK as in Gmsh (https://gmsh.info/doc/texinfo/gmsh.html#Node-ordering). Quadrilaterals of six nodes are
+# VTK's, with nodes on the first and the third side.
 _PARTS: dict[tuple[Shape, int], list[list[int]]] = {
     ("triangle", 6): [[0, 3, 5], [3, 1, 4], [5, 4, 2], [3, 4, 5]],
     ("triangle", 7): [[0, 3, 6], [3, 1, 6], [1, 4, 6], [4, 2, 6], [2, 5, 6], [5, 0, 6]],

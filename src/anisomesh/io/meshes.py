@@ -77,7 +77,9 @@ def load(path: str | os.PathLike[str] | BinaryIO, *, file_format: str | None = N
     try:
         if suffix in _TEXT_FORMATS:
             data = data.removeprefix(BYTE_ORDER_MARK)
-        surface, _, remarks = polygons.as_triangles(_READERS[suffix](data))
+        with np.errstate(over="ignore", invalid="ignore"):  # what is not finite is reported by polygons.validate
+            soup = _READERS[suffix](data)
+        surface, _, remarks = polygons.as_triangles(soup)
     except Exception as error:
         # Our readers raise ValueError with an explanation; other exceptions come from libraries.
         reason = str(error)
@@ -216,7 +218,7 @@ def _bytes_of(surface: Surface, suffix: str, data: dict[str, npt.NDArray[Any]]) 
         case ".glb":
             return glb.glb_bytes(points, faces)
         case ".3mf":
-            return threemf.bytes_of_3mf(points, faces)
+            return threemf.threemf_bytes(points, faces)
         case ".vtu":
             return vtk_xml.vtu_bytes(points, faces, sizes, data)
         case ".vtp":

@@ -43,9 +43,8 @@ def read_stl(data: bytes) -> PolygonSoup:
     else:
         if len(data) > end:
             remarks.append(f"left out {len(data) - end} byte(s) behind the {declared} triangles that it declares")
-        with np.errstate(invalid="ignore"):  # NaN is reported by polygons.validate
-            rows = np.frombuffer(data, dtype=_TRIANGLE, offset=_HEADER_BYTES, count=declared)
-            corners = rows["corners"].astype(np.float64).reshape(-1, 3)
+        rows = np.frombuffer(data, dtype=_TRIANGLE, offset=_HEADER_BYTES, count=declared)
+        corners = rows["corners"].astype(np.float64).reshape(-1, 3)
     points, inverse = np.unique(coincident(corners), return_inverse=True)
     logger.info("STL stores no connectivity: welded %d corners into %d points", len(corners), len(points))
     return PolygonSoup.from_array(corners[points], inverse.reshape(-1, 3), remarks=remarks)

@@ -177,7 +177,7 @@ def _product(first: npt.NDArray[np.float64], then: npt.NDArray[np.float64]) -> n
     return product
 
 
-def bytes_of_3mf(points: Points, faces: Faces) -> bytes:
+def threemf_bytes(points: Points, faces: Faces) -> bytes:
     """Return the content of a 3MF archive of one object, in millimetres, in float64."""
     vertices = format_rows('<vertex x="%r" y="%r" z="%r"/>\n', points)
     triangles = format_rows('<triangle v1="%d" v2="%d" v3="%d"/>\n', faces)

@@ -110,8 +110,7 @@ class ArrayReader:
         match element.get("format", "ascii"):
             case "ascii":
                 parse = float if kind.startswith("Float") else int
-                with np.errstate(over="ignore"):  # infinity is reported by polygons.validate
-                    return np.array([parse(word) for word in (element.text or "").split()], dtype=_TYPES[kind])
+                return np.array([parse(word) for word in (element.text or "").split()], dtype=_TYPES[kind])
             case "binary":
                 data = self._unpacked(_from_base64((element.text or "").encode()), name)
             case "appended":
