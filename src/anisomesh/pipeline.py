@@ -53,8 +53,7 @@ def remesh(
     Parameters
     ----------
     mesh
-        Points (V, 3) together with ``faces``, or a :class:`Surface`, a ``trimesh.Trimesh`` or a
-        ``pyvista.PolyData`` of triangles.
+        Points (V, 3) together with ``faces``, or what :func:`~anisomesh.io.convert.as_surface` takes.
     faces
         Triangles (F, 3), if the first argument is an array of points.
     n_vertices

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import os
 from pathlib import Path
-from typing import Any
+from typing import Any, Literal
 
 import igl
 import numpy as np
@@ -15,6 +15,7 @@ from anisomesh._arrays import EdgeMask
 from anisomesh.errors import MeshFileError, OptionError
 from anisomesh.mesh.surface import Surface
 from anisomesh.mesh.topology import edge_keys
+from anisomesh.repair.near_points import weld_distance
 
 _MAX_DIGITS = 18  # of a decimal number that fits in 64 bits
 _MIN_SEARCH_RADIUS = 1e-12  # times the diagonal of the input: rounding of copied points
@@ -45,7 +46,9 @@ def load_pairs(path: str | os.PathLike[str]) -> npt.NDArray[np.int64]:
     return np.array(pairs, dtype=np.int64).reshape(-1, 2)
 
 
-def tagged_edges(input_mesh: Surface, pairs: npt.ArrayLike, prepared: Surface, tolerance: float) -> EdgeMask:
+def tagged_edges(
+    input_mesh: Surface, pairs: npt.ArrayLike, prepared: Surface, tolerance: float | Literal["auto"]
+) -> EdgeMask:
     """Return which edges (E,) of the prepared surface are tagged.
 
     Parameters
@@ -57,7 +60,7 @@ def tagged_edges(input_mesh: Surface, pairs: npt.ArrayLike, prepared: Surface, t
     prepared
         The surface after repair, in the same coordinates.
     tolerance
-        Weld tolerance of the repair, in model units.
+        Weld tolerance of the repair, in model units or ``"auto"``.
 
     Raises
     ------
@@ -72,7 +75,7 @@ def tagged_edges(input_mesh: Surface, pairs: npt.ArrayLike, prepared: Surface, t
     tree = cKDTree(prepared.points)
     found = np.zeros(len(prepared.edges), dtype=bool)
     keys = edge_keys(prepared.edges)
-    radius = max(tolerance, _MIN_SEARCH_RADIUS * input_mesh.diagonal)
+    radius = max(weld_distance(input_mesh, tolerance), _MIN_SEARCH_RADIUS * input_mesh.diagonal)
     copies = [tree.query_ball_point(input_mesh.points[column], radius) for column in ends.T]
     wanted = [(a, b) for first, second in zip(*copies, strict=True) for a in first for b in second if a != b]
     if wanted:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import logging
 from dataclasses import dataclass, fields
+from typing import Literal
 
 import numpy as np
 
@@ -13,6 +14,7 @@ from anisomesh.mesh import geometry, topology
 from anisomesh.mesh.surface import Surface
 from anisomesh.mesh.weld import coincident
 from anisomesh.repair import degenerate, duplicates, orientation
+from anisomesh.repair.near_points import weld_distance
 
 logger = logging.getLogger(__name__)
 
@@ -99,7 +101,7 @@ class Prepared:
     point_source: PointLabels
 
 
-def prepare(surface: Surface, *, weld_tolerance: float = 0.0) -> Prepared:
+def prepare(surface: Surface, *, weld_tolerance: float | Literal["auto"] = 0.0) -> Prepared:
     """Make any triangle mesh an oriented manifold, with as few changes as possible.
 
     Parameters
@@ -107,7 +109,8 @@ def prepare(surface: Surface, *, weld_tolerance: float = 0.0) -> Prepared:
     surface
         Any triangle mesh.
     weld_tolerance
-        Points up to this distance, in model units, are merged; 0 merges equal points only.
+        Points up to this distance, in model units, are merged; 0 merges equal points only, ``"auto"`` is 1e-5 of the
+        bounding-box diagonal.
 
     Returns
     -------
@@ -130,10 +133,11 @@ def prepare(surface: Surface, *, weld_tolerance: float = 0.0) -> Prepared:
     changes nothing. Sorting dominates the cost, O((V + F) log(V + F)).
     """
     _check_range(surface)
-    _check_tolerance(surface, weld_tolerance)
-    passes = [_repair_once(surface, weld_tolerance)]
+    tolerance = weld_distance(surface, weld_tolerance)
+    _check_tolerance(surface, tolerance)
+    passes = [_repair_once(surface, tolerance)]
     while passes[-1].changed and len(passes) < _MAX_REPAIR_PASSES:
-        passes.append(_repair_once(passes[-1].surface, weld_tolerance))
+        passes.append(_repair_once(passes[-1].surface, tolerance))
     result = passes[-1].surface
     source = passes[0].source
     for later in passes[1:]:
