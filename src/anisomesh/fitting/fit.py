@@ -11,8 +11,8 @@ from anisomesh.fitting.state import FitState
 from anisomesh.mesh.surface import Surface
 
 _FIRST_SWEEPS, _ROUND_SWEEPS, _LAST_SWEEPS = 4, 2, 8  # at most
-_RISE = (1.0, 3.0, 10.0, 30.0)  # steps of a price that rises
-_MAX_ERROR_FACTOR = 1.5  # root mean squared error over the one at the start, up to which a price rises
+_RISE = (1.0, 7.0, 50.0, 300.0)  # steps of a price that rises
+_MAX_ERROR_FACTOR = 2.5  # root mean squared error over the one at the start, up to which a price rises
 _MIN_SWEEP_GAIN = 1e-2  # of the energy in a sweep, below which it is the last
 
 
@@ -32,8 +32,8 @@ class FitOptions:
     share
         Points added and removed in a round, of all points.
     min_quality
-        Mean quality up to which the price rises: to 30 times what it is at most, and as long as the root mean squared
-        error is not 1.5 times the one at the start. 0 for a price that stays.
+        Mean quality up to which the price rises: to 300 times what it is at most, and as long as the root mean squared
+        error is not 2.5 times the one at the start. 0 for a price that stays.
     """
 
     price: float = 20.0
