@@ -6,7 +6,7 @@ from html.parser import HTMLParser
 import pytest
 
 import anisomesh
-from anisomesh.io.html import html_table
+from anisomesh.io.describe import html_table
 from anisomesh.shapes.analytic import sphere
 
 BALL = sphere(2)

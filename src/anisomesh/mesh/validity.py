@@ -74,31 +74,6 @@ class Validity:
         """Return a dictionary of all fields, for JSON."""
         return asdict(self)
 
-    def faults(self) -> list[str]:
-        """Return what is wrong with the remesh, such as ``"3 inverted triangles"``; nothing if it is valid.
-
-        Its topology is wrong where it differs from the topology of the input. Intersections that the input has too are
-        not counted.
-        """
-        topology = (
-            ("boundary loops", self.boundary_loops, self.boundary_loops_input),
-            ("components", self.components, self.components_input),
-            ("Euler characteristic", self.euler, self.euler_input),
-        )
-        defects = (
-            ("duplicate triangle", self.duplicate_faces),
-            ("non-manifold edge", self.nonmanifold_edges),
-            ("non-manifold point", self.nonmanifold_vertices),
-            ("flat triangle", self.flat),
-            ("inverted triangle", self.inverted),
-            ("intersecting pair", self.new_intersections),
-        )
-        return [
-            *(f"{name} {count} instead of {expected}" for name, count, expected in topology if count != expected),
-            *([] if self.oriented else ["not oriented"]),
-            *(f"{count:,} {name}{'s' if count > 1 else ''}" for name, count in defects if count),
-        ]
-
 
 def check_validity(result: Surface, reference: Surface) -> Validity:
     """Compare the topology of a remesh with its input's and count its defects.
