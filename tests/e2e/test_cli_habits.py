@@ -82,6 +82,23 @@ def test_standard_input_has_no_default_name(run):
     assert "give -o OUT" in done.stderr
 
 
+@pytest.mark.parametrize(
+    ("words", "code", "message"),
+    [
+        (["drawing.svg"], 2, "drawing.svg: expected a file name ending in one of"),
+        (["missing.ply"], 1, "missing.ply: no such file"),
+        ([".", "--input-format", "ply"], 1, ".: is a folder"),
+        (["part.ply", "--output-format", "docx"], 2, "--output-format docx: expected one of"),
+    ],
+)
+def test_an_input_without_a_good_name_is_refused_by_its_own_name(run, tmp_path, words, code, message):
+    done = run("remesh", *words, "-n", 50, "-q")
+    assert done.returncode == code
+    assert done.stderr.startswith("anisomesh: error: ")
+    assert message in done.stderr
+    assert list(tmp_path.iterdir()) == []
+
+
 def lines(process, level):
     return [line for line in process.stderr.splitlines() if line.startswith(f"anisomesh: {level}: ")]
 

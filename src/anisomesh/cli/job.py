@@ -119,13 +119,15 @@ def default_output(source: Path, input_format: str | None, output_format: str | 
     Raises
     ------
     typer.BadParameter
-        If the input is standard input, or the file exists: without its name given, nothing is replaced.
+        If the input is standard input or has no known suffix, or the file exists: it is replaced only if it is named.
     """
     if source == STANDARD_STREAM:
         raise typer.BadParameter("give -o OUT: standard input has no name to make one from")
     given = output_format or input_format
+    if given is None:
+        check_format(source.suffix, str(source))
     suffix = source.suffix if given is None else "." + given.lower().removeprefix(".")
-    path = source.with_name(f"{source.stem}_remeshed{suffix}")
+    path = source.parent / f"{source.stem}_remeshed{suffix}"
     if path.exists():
         raise typer.BadParameter(f"{path} exists; give -o {path} to replace it, or another name")
     return path
