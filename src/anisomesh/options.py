@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Any, Literal, get_args
 from anisomesh._values import real_number, whole_number
 from anisomesh.errors import OptionError
 from anisomesh.metric.names import METRIC_NAMES, MetricName
+from anisomesh.toml import hint
 
 if TYPE_CHECKING:  # the command line imports this module, and has to start at once
     import numpy.typing as npt
@@ -193,7 +194,9 @@ def with_overrides(options: Any, overrides: dict[str, Any]) -> RemeshOptions:
     known = [field.name for field in fields(RemeshOptions)]
     for name in overrides:
         if name not in known:
-            raise OptionError(f"remesh has no option {name!r}; expected one of {', '.join(known)}")
+            names = ["n_vertices", "ratio", "max_error", *known]
+            remedy = hint(name, names) or f"; expected one of {', '.join(names)}"
+            raise OptionError(f"remesh has no option {name!r}{remedy}")
     return replace(options, **overrides)
 
 

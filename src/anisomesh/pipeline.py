@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+import logging
+import os
+from contextlib import nullcontext
 from dataclasses import dataclass, replace
 from typing import Any
 
@@ -21,7 +24,8 @@ from anisomesh.features.tagged import distance_to_crease_edges
 from anisomesh.fitting.target import FitTarget
 from anisomesh.fitting.valid import fit_without_faults
 from anisomesh.inputs import PreparedInput, prepared_input
-from anisomesh.io.convert import as_surface
+from anisomesh.io.describe import soundness
+from anisomesh.io.meshes import surface_of
 from anisomesh.mesh.surface import Surface
 from anisomesh.mesh.validity import Validity, check_validity
 from anisomesh.options import MIN_VERTICES, RemeshOptions, read_target, with_overrides
@@ -33,6 +37,8 @@ from anisomesh.result import RemeshResult
 from anisomesh.search import smallest_within
 from anisomesh.tasks import set_up
 from anisomesh.voronoi.restricted import RestrictedVoronoi
+
+logger = logging.getLogger(__name__)
 
 MAX_STARTS = 3  # of the optimisation, with one seed after the other, for a mesh without faults
 
@@ -53,7 +59,8 @@ def remesh(
     Parameters
     ----------
     mesh
-        Points (V, 3) together with ``faces``, or what :func:`~anisomesh.io.convert.as_surface` takes.
+        The name of a mesh file; points (V, 3) together with ``faces``; or what
+        :func:`~anisomesh.io.convert.as_surface` takes.
     faces
         Triangles (F, 3), if the first argument is an array of points.
     n_vertices
@@ -75,6 +82,8 @@ def remesh(
 
     Raises
     ------
+    MeshFileError
+        If the file cannot be read.
     MeshError
         If the input is not a mesh, or nothing is left of it after the repair.
     MetricError
@@ -93,8 +102,9 @@ def remesh(
     if on_step is not None and not callable(on_step):
         raise OptionError(f"on_step = {on_step!r}; expected a function of a StepInfo")
     run = Run(on_step or ignore_steps, deadline)
-    surface = as_surface(mesh, faces)
     n_vertices, ratio, max_error = read_target(n_vertices, ratio, max_error)
+    with run.stage("load") if isinstance(mesh, str | os.PathLike) else nullcontext():
+        surface = surface_of(mesh, faces)
     with run.stage("prepare"):
         source = prepared_input(surface, options)
     prepared = source.prepared.surface
@@ -203,6 +213,8 @@ def _mesh_of_start(task: MeshingTask, target: FitTarget | None, options: RemeshO
             surface = fit_without_faults(surface, target, crease_edges=mesh.crease_edges, deadline=run.deadline)
             mesh = replace(mesh, points=surface.points, faces=surface.faces, crease_edges=mesh.crease_edges[:0])
         validity = check_validity(surface, task.surface)
+    facts = options.seed, optimised.iterations, optimised.status, soundness(validity)
+    logger.info("seed %d: %d iterations, %s; mesh: %s", *facts)
     return _Made(
         mesh=mesh, optimised=optimised, validity=validity, feature_distance=feature_distance, seed=options.seed
     )

@@ -10,6 +10,7 @@ from typing import Any
 from anisomesh._arrays import CornerTensors, PointTensors, Sites
 from anisomesh.cvt.lbfgs import Status
 from anisomesh.embedding.base import Embedding
+from anisomesh.io.describe import html_table, soundness
 from anisomesh.io.rvd import PolygonMesh, save_polygons
 from anisomesh.mesh.geometry import Frame
 from anisomesh.mesh.surface import Surface
@@ -93,6 +94,22 @@ class RemeshResult:
     warnings: tuple[str, ...]
     distance: float | None = None
     feature_distance: float = 0.0
+
+    def __repr__(self) -> str:
+        return (
+            f"RemeshResult({self.surface.n_points:,} vertices, {self.surface.n_faces:,} triangles, "
+            f"{soundness(self.validity)}, {self.seconds['total']:.1f} s)"
+        )
+
+    def _repr_html_(self) -> str:
+        rows = [
+            ("vertices", f"{self.surface.n_points:,} (asked for {self.vertices_asked:,})"),
+            ("triangles", f"{self.surface.n_faces:,}"),
+            ("validity", soundness(self.validity)),
+            ("time", f"{self.seconds['total']:.1f} s"),
+            *(("warning", text) for text in self.warnings),
+        ]
+        return html_table("RemeshResult", rows)
 
     @property
     def diagram(self) -> Diagram:

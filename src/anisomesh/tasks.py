@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import logging
 from dataclasses import dataclass
 
 import numpy as np
@@ -29,6 +30,8 @@ from anisomesh.metric.transfer import PlacedMetric
 from anisomesh.options import RemeshOptions
 from anisomesh.resolve import embedder, fit_plan, follows_creases, metric_source, with_embedding_chosen
 from anisomesh.voronoi.restricted import RestrictedVoronoi
+
+logger = logging.getLogger(__name__)
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -76,6 +79,7 @@ def set_up(source: PreparedInput, n: int, options: RemeshOptions, run: Run, *, n
         split = working_surface(surface, n, creases=creases, tagged=source.tagged)
         tips = apexes(split.coarse, sharp_edges(split.coarse, options.feature_angle))
         check_memory(n, split.surface.n_faces)
+        logger.info("working surface: %r; embedding: %s", split.surface, options.embedding)
     with run.stage("metric"):
         tensors = None if source.tensors is None else split.interpolate(source.tensors * frame.scale**2)
         field = checked_field(metric_source(options, surface, tensors)(split.surface), split.surface)

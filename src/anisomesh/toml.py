@@ -56,6 +56,7 @@ def check_keys(where: str, table: dict[str, Any], known: Iterable[str]) -> None:
 
 
 def hint(word: str, known: Iterable[str]) -> str:
-    """Return a suggestion of the most similar known word, empty if none is similar."""
-    close = difflib.get_close_matches(word, list(known), 1)
+    """Return a suggestion of the most similar known word, or of one that begins with the word; empty if none does."""
+    names = list(known)
+    close = difflib.get_close_matches(word, names, 1) or [name for name in names if name.startswith(word)]
     return f" (did you mean {close[0]!r}?)" if close else ""

@@ -79,7 +79,7 @@ def test_one_ratio_of_a_suite(run_cli, tmp_path):
     done = run_cli("benchmark", tmp_path / "two.toml", "-o", tmp_path, "--ratio", 0.3, "--quiet")
     assert (done.returncode, done.stderr) == (0, "")
     assert {row["ratio"] for row in read_rows(tmp_path / "two.jsonl")} == {0.3}
-    assert run_cli("benchmark", tmp_path / "two.toml", "-o", tmp_path, "--ratio", -1).returncode == 1
+    assert run_cli("benchmark", tmp_path / "two.toml", "-o", tmp_path, "--ratio", -1).returncode == 2
 
 
 @pytest.mark.slow

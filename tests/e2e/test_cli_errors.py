@@ -122,7 +122,8 @@ def test_a_folder_that_cannot_be_written_is_found_out_before_the_work(refuse, to
 def test_a_file_of_features_that_is_missing_or_binary_is_named(refuse, torus_obj, tmp_path):
     words = ["remesh", torus_obj, "-o", "out.ply", "-n", 100, "--features"]
     line = refuse(1, *words, "missing.txt")
-    assert line == "anisomesh: error: missing.txt: cannot be read: No such file or directory"
+    reason = "No such file or directory; expected a text file, two vertex numbers per line"
+    assert line == f"anisomesh: error: missing.txt: cannot be read: {reason}"
     (tmp_path / "pairs.bin").write_bytes(b"\xff\xfe\x00")
     assert "pairs.bin: cannot be read as text" in refuse(1, *words, "pairs.bin")
 

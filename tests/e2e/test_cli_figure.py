@@ -197,7 +197,7 @@ def test_from_and_up_turn_the_camera(figure):
         (["gallery", "fine.obj", "missing.obj"], 1, "missing.obj"),
         (["gallery", "fine.obj", "-o", "out"], 2, ".png or .pdf"),
         (["strip", "fine.obj", "--ratios", "0.5", "0"], 2, "0 is not a positive"),
-        (["strip", "fine.obj", "--ratios", "1,half"], 2, "half is not a positive"),
+        (["strip", "fine.obj", "--ratios", "1,half"], 2, "'half' is not a share"),
         (["strip", "missing.obj"], 1, "missing.obj"),
         (["heap", "fine.obj"], 2, "heap"),
     ],

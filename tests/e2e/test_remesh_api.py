@@ -8,7 +8,7 @@ import pytest
 
 import anisomesh
 from anisomesh import pipeline
-from anisomesh.errors import MeshError, MetricError, OptionError
+from anisomesh.errors import MeshError, MeshFileError, MetricError, OptionError
 from anisomesh.mesh.distance import surface_distance
 from anisomesh.mesh.surface import Surface
 from anisomesh.metric.quality import anisotropic_quality
@@ -223,7 +223,8 @@ def test_a_wrong_tensor_is_named_by_the_point_of_the_input():
     tensors[:3] = 0.0
     anisomesh.remesh(surface, n_vertices=40, metric=tensors, **FEW)
     tensors[10] = np.diag([1.0, 2.0, -5.0])
-    with pytest.raises(MetricError, match=r"metric\[10\] = .*-5\.0.*\(1 such places\)"):
+    words = rf"metric\[10\] = .*-5\.0.*\(eigenvalues -5, 1, 2; like this: 1 of {base.n_points}\)"
+    with pytest.raises(MetricError, match=words):
         anisomesh.remesh(surface, n_vertices=40, metric=tensors)
     with pytest.raises(OptionError, match=r"density\[10\] = 0"):
         anisomesh.remesh(surface, n_vertices=40, density=np.where(np.arange(surface.n_points) == 10, 0.0, 1.0))
@@ -268,5 +269,54 @@ def test_values_that_are_not_meshes_are_refused():
         anisomesh.remesh([[0.0, 0, 0], [1, 0, 0], [0, 1, 0]], [[0, 1, 2], [0, 1]], n_vertices=100)
     with pytest.raises(MeshError, match="leave out the second argument"):
         anisomesh.remesh(torus(1.0, 0.3, 8, 6), [[0, 1, 2]], n_vertices=100)
-    with pytest.raises(MeshError, match="cannot read a mesh from str"):
+    with pytest.raises(MeshError, match="cannot read a mesh from float"):
+        anisomesh.remesh(3.0, n_vertices=100)
+    with pytest.raises(MeshError, match=r"the mesh is the file ring\.ply and has faces; leave out the second argument"):
+        anisomesh.remesh("ring.ply", [[0, 1, 2]], n_vertices=100)
+    with pytest.raises(MeshFileError, match=r"bunny\.obj: no such file"):
         anisomesh.remesh("bunny.obj", n_vertices=100)
+
+
+def test_a_mesh_may_be_the_name_of_a_file(ring, tmp_path):
+    anisomesh.save(ring, tmp_path / "ring.ply")
+    steps = []
+    result = anisomesh.remesh(tmp_path / "ring.ply", n_vertices=60, on_step=steps.append, **FEW)
+    expected = anisomesh.remesh(ring, n_vertices=60, **FEW)
+    np.testing.assert_array_equal(result.surface.points, expected.surface.points)
+    assert steps[0].stage == "load"
+    assert result.seconds["load"] > expected.seconds["load"] == 0.0
+    anisomesh.save(result.surface, tmp_path / "result.ply")
+    measured = anisomesh.evaluate(str(tmp_path / "ring.ply"), str(tmp_path / "result.ply"), samples=500)
+    assert measured.as_dict() == anisomesh.evaluate(ring, result.surface, samples=500).as_dict()
+
+
+@pytest.mark.parametrize(
+    ("given", "words"),
+    [
+        ({"n": 200}, r"has no option 'n' \(did you mean 'n_vertices'\?\)$"),
+        ({"n_vertexes": 200}, "did you mean 'n_vertices'"),
+        ({"sharpnes": 3.0}, "did you mean 'sharpness'"),
+        ({"iterations": 3}, "did you mean 'max_iterations'"),
+        ({"colour": "red"}, "has no option 'colour'; expected one of n_vertices, ratio, max_error, sharpness, "),
+        ({"n_vertices": "200"}, "n_vertices = '200'; expected a whole number of at least 4, written without quotes"),
+        ({"ratio": "0.2"}, "ratio = '0.2'; expected a number, written without quotes"),
+        ({"n_vertices": 100, "seed": "a"}, "seed = 'a'; expected a whole number of at least 0, written without quotes"),
+    ],
+)
+def test_a_wrong_keyword_or_type_is_answered_with_what_was_meant(ring, given, words):
+    with pytest.raises(OptionError, match=words):
+        anisomesh.remesh(ring, **given)
+
+
+def test_wrong_tensors_are_counted_by_points_of_the_input():
+    """Points that the repair multiplies count once."""
+    ball = sphere(1)
+    low = int(ball.points[:, 2].argmin())
+    other = ball.faces[:, ::-1] + ball.n_points  # the ball reflected in its lowest point, which both share
+    other[other == ball.n_points + low] = low
+    points = np.concatenate([ball.points, 2.0 * ball.points[low] - ball.points])
+    surface = Surface(points, np.concatenate([ball.faces, other]))
+    tensors = np.tile(np.eye(3), (surface.n_points, 1, 1))
+    tensors[low] = 0.0
+    with pytest.raises(MetricError, match=rf"metric\[{low}\] .* like this: 1 of {surface.n_points - 1}\)"):
+        anisomesh.remesh(surface, n_vertices=100, metric=tensors)

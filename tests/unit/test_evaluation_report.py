@@ -101,4 +101,4 @@ def test_an_empty_result_is_refused():
     with pytest.raises(MeshError, match="no face"):
         evaluate(sphere(1), Surface(np.zeros((3, 3)), np.zeros((0, 3), dtype=int)))
     with pytest.raises(MeshError, match="cannot read a mesh"):
-        evaluate(sphere(1), "result.ply")
+        evaluate(sphere(1), 3.0)

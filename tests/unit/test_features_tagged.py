@@ -4,7 +4,8 @@ import numpy as np
 import pytest
 
 from anisomesh.errors import MeshFileError, OptionError
-from anisomesh.features.tagged import distance_to_crease_edges, load_pairs, tagged_edges
+from anisomesh.features.tagged import distance_to_crease_edges, tagged_edges
+from anisomesh.io.text_tables import load_pairs
 from anisomesh.mesh.surface import Surface
 from anisomesh.repair.prepare import prepare
 from anisomesh.shapes.analytic import open_patch

@@ -19,7 +19,9 @@ if TYPE_CHECKING:
     from anisomesh.mesh.surface import Surface
 
 DEFAULT_OPTIONS = RemeshOptions()
-_option = partial(typer.Option, rich_help_panel="Remeshing")
+_option = partial(typer.Option, rich_help_panel="How to remesh")
+target_option = partial(typer.Option, rich_help_panel="Number of vertices")
+_advanced = partial(typer.Option, rich_help_panel="Advanced")
 _Command = TypeVar("_Command", bound=Callable[..., None])
 
 
@@ -36,26 +38,59 @@ def positive(value: float | None) -> float | None:
     return value
 
 
+def at_least_one(value: float | None) -> float | None:
+    """Return the value of an option unless it is not a finite number of at least 1.
+
+    Raises
+    ------
+    typer.BadParameter
+        If the value is given and is not a finite number of at least 1.
+    """
+    if value is not None and not (math.isfinite(value) and value >= 1.0):
+        raise typer.BadParameter(f"{value:g} is not a finite number of at least 1")
+    return value
+
+
+def share(text: str | float) -> float:
+    """Return the share in a text such as ``0.2`` or ``20%``.
+
+    Raises
+    ------
+    typer.BadParameter
+        If the text is not a positive finite number, with or without a per cent sign.
+    """
+    word = str(text)
+    try:
+        value = float(word.removesuffix("%"))
+    except ValueError:
+        raise typer.BadParameter(f"{word!r} is not a share such as 0.2, or 20%") from None
+    positive(value)
+    return value / 100.0 if word.endswith("%") else value
+
+
 REMESH_OPTIONS: dict[str, Any] = {
     "metric": Annotated[
         MetricName,
         _option(
-            help="curvature: stretched along small curvature, as in the paper; approximation: least distance from the "
-            "input; uniform: equilateral triangles."
+            metavar="NAME",
+            help="curvature: long where the surface is straight, as in the paper; approximation: least distance from "
+            "the input; uniform: equilateral.",
         ),
     ],
     "sharpness": Annotated[
         float,
         _option(
-            callback=positive,
-            help="Weight of the normals, from 1: 1 ignores creases, 7 as in the paper, more keeps them more exactly.",
+            callback=at_least_one,
+            metavar="X",
+            help="How strongly vertices are drawn onto creases: 1 not at all, 7 as in the paper.",
         ),
     ],
     "final_sharpness": Annotated[
         float | None,
         _option(
-            callback=positive,
-            help="Finish the optimisation with this sharpness; 30 moves vertices onto corners and creases.",
+            callback=at_least_one,
+            metavar="X",
+            help="End with this sharpness; 30 moves vertices onto corners and creases.",
         ),
     ],
     "feature_angle": Annotated[
@@ -63,28 +98,13 @@ REMESH_OPTIONS: dict[str, Any] = {
         _option(
             min=0.0,
             max=180.0,
-            help="Edges of the input that bend by more than this many degrees are creases; 180 for no creases.",
+            metavar="DEGREES",
+            help="Edges of the input that bend by more than this are creases; 180 for none.",
         ),
     ],
-    "embedding": Annotated[
-        EmbeddingName,
-        _option(
-            help="Source of the metric. direct: measured curvature; filtered: the same after filters have removed "
-            "noise; neural: a network; hybrid: the mean of measured and predicted curvature; auto: hybrid if the "
-            "metric is curvature and the input is not a designed part, else direct."
-        ),
-    ],
-    "weights": Annotated[
-        str | None,
-        _option(
-            metavar="FILE",
-            help="Network to use: a file written by anisomesh train, or the name of a pretrained network.",
-        ),
-    ],
-    "device": Annotated[DeviceName, _option(help="Where the network runs.")],
     "denoise": Annotated[
         bool,
-        _option("--denoise/--keep-noise", help="Remove the noise that the network or the filters find, or keep it."),
+        _option("--denoise/--keep-noise", help="Remove noise that is found in a scan, or keep it."),
     ],
     "fit": Annotated[
         bool,
@@ -94,15 +114,14 @@ REMESH_OPTIONS: dict[str, Any] = {
         float,
         _option(
             callback=positive,
-            help="How much the shape of triangles counts in the fit: above 1 for better shaped triangles, below 1 for "
-            "a smaller distance.",
+            metavar="X",
+            help="Weight of the shape of triangles in the fit: above 1 for better shapes, below 1 for a smaller "
+            "distance.",
         ),
     ],
-    "seed": Annotated[
-        int,
-        _option(min=0, help="Seed of the initial sites; the same seed and input give the same result."),
+    "threads": Annotated[
+        int, _option(min=1, max=MAX_THREADS, metavar="N", help="Worker threads; they do not change the result.")
     ],
-    "threads": Annotated[int, _option(min=1, max=MAX_THREADS, help="Worker threads; they do not change the result.")],
     "time_limit": Annotated[
         float | None,
         _option(
@@ -110,6 +129,39 @@ REMESH_OPTIONS: dict[str, Any] = {
             metavar="SECONDS",
             help="Stop the optimisation after this time and finish with the result so far.",
         ),
+    ],
+    "embedding": Annotated[
+        EmbeddingName,
+        _advanced(
+            metavar="NAME",
+            help="Where the metric comes from. direct: measured curvature; filtered: the same after filters have "
+            "removed noise; neural: a network; hybrid: the mean of direct and neural; auto: hybrid for scans, direct "
+            "for designed parts and for other metrics.",
+        ),
+    ],
+    "weights": Annotated[
+        str | None,
+        _advanced(
+            metavar="FILE",
+            help="Network to use: a file written by anisomesh train, or the name of a pretrained network.",
+        ),
+    ],
+    "device": Annotated[
+        DeviceName, _advanced(metavar="NAME", help="Where the network runs: cpu, or cuda (extra: train).")
+    ],
+    "seed": Annotated[
+        int,
+        _advanced(min=0, metavar="N", help="Seed of the start; the same seed and input give the same result."),
+    ],
+    "lloyd_iterations": Annotated[int, _advanced(min=0, metavar="N", help="Steps of Lloyd's algorithm at the start.")],
+    "max_iterations": Annotated[
+        int | None,
+        _advanced(
+            min=0, metavar="N", show_default="50, or 150 with --no-fit", help="Largest number of steps of L-BFGS."
+        ),
+    ],
+    "embedding_iterations": Annotated[
+        int, _advanced(min=1, metavar="N", help="Largest number of steps of the direct embedding.")
     ],
 }
 """Types, checks and help texts of the fields of :class:`RemeshOptions` that commands offer."""
@@ -175,10 +227,15 @@ class Length:
 
 
 Source = Annotated[Path, typer.Argument(metavar="IN", help="Mesh to remesh: OBJ, OFF, PLY, STL, GLB, 3MF, VTU, ...")]
-Vertices = Annotated[int | None, typer.Option("--vertices", "-n", min=4, help="Number of vertices of the result.")]
+Vertices = Annotated[
+    int | None,
+    target_option("--vertices", "-n", min=4, metavar="N", help="Number of vertices of the result, at least 4."),
+]
 Ratio = Annotated[
     float | None,
-    typer.Option("--ratio", callback=positive, help="Vertices of the result per vertex of the repaired input."),
+    target_option(
+        "--ratio", parser=share, metavar="SHARE", help="Vertices as a share of the input's, such as 0.2 or 20%."
+    ),
 ]
 InputFormat = Annotated[
     str | None, typer.Option(metavar="FORMAT", help="Format of IN, if its suffix does not name it: ply, obj, ...")

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
+from anisomesh.cli.arguments import share
 from anisomesh.cli.progress import announce_compilation, progress
 
 if TYPE_CHECKING:
@@ -32,7 +33,10 @@ def command(
     ratios: Annotated[
         list[float] | None,
         typer.Option(
-            "--ratio", help="Run only this ratio (result vertices per input vertex), not all of the suite; repeatable."
+            "--ratio",
+            parser=share,
+            metavar="SHARE",
+            help="Run only this ratio (result vertices per input vertex), not all of the suite; repeatable.",
         ),
     ] = None,
     show_list: Annotated[bool, typer.Option("--list", help="List the suites and exit.")] = False,

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
+from anisomesh.cli.log import logs
 from anisomesh.cli.progress import announce_compilation, progress
 from anisomesh.cli.report import counted, table
 from anisomesh.learn.data.recipe import VARIANTS, EveningName, Recipe
@@ -31,6 +32,7 @@ app = typer.Typer(help="Build and describe data sets for training networks.", no
 
 
 @app.command("build")
+@logs
 def build_command(
     source: Annotated[Path, typer.Argument(metavar="SRC", help="Folder of meshes.")],
     out: Annotated[Path, typer.Argument(metavar="OUT", help="Folder of the data set; created if missing.")],
@@ -75,6 +77,7 @@ def build_command(
 
 
 @app.command("info")
+@logs
 def info_command(folder: Annotated[Path, typer.Argument(metavar="DATASET", help="Folder of a data set.")]) -> None:
     """Describe a data set, and the shapes that were dropped or failed, with the reason."""
     from anisomesh.errors import MeshFileError

@@ -106,6 +106,33 @@ class Outputs:
             save(result.surface, sys.stdout.buffer, file_format=self.mesh_format)
 
 
+def default_output(source: Path, input_format: str | None, output_format: str | None) -> Path:
+    """Return the file for a result for which none was named: ``part_remeshed.ply`` beside ``part.ply``.
+
+    Parameters
+    ----------
+    source
+        The input, or :data:`STANDARD_STREAM`.
+    input_format, output_format
+        The formats of input and result, if they are given; one of them is the suffix in place of the input's.
+
+    Raises
+    ------
+    typer.BadParameter
+        If the input is standard input or has no known suffix, or the file exists: it is replaced only if it is named.
+    """
+    if source == STANDARD_STREAM:
+        raise typer.BadParameter("give -o OUT: standard input has no name to make one from")
+    given = output_format or input_format
+    if given is None:
+        check_format(source.suffix, str(source))
+    suffix = source.suffix if given is None else "." + given.lower().removeprefix(".")
+    path = source.parent / f"{source.stem}_remeshed{suffix}"
+    if path.exists():
+        raise typer.BadParameter(f"{path} exists; give -o {path} to replace it, or another name")
+    return path
+
+
 def check_format(name: str, where: str) -> None:
     """Raise typer.BadParameter if a name, such as ply or .ply, is not a mesh format; ``where`` begins the message."""
     from anisomesh.io.meshes import MESH_FORMATS

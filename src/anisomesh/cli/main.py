@@ -11,7 +11,9 @@ from typing import Annotated
 
 import typer
 
-from anisomesh.cli import benchmark, dataset, demo, evaluate, figure, info, remesh, train
+from anisomesh.cli import benchmark, dataset, demo, evaluate, info, remesh, train
+from anisomesh.cli.figures import group as figure
+from anisomesh.cli.log import logs
 from anisomesh.errors import AnisomeshError
 
 # The base class of all usage errors; typer exports only this subclass.
@@ -19,18 +21,17 @@ _UsageError: type[Exception] = typer.BadParameter.__bases__[0]
 
 app = typer.Typer(
     name="anisomesh",
-    add_completion=False,
     pretty_exceptions_enable=False,
     context_settings={"help_option_names": ["-h", "--help"]},
 )
-app.command("remesh")(remesh.command)
-app.command("evaluate")(evaluate.command)
+app.command("remesh")(logs(remesh.command))
+app.command("evaluate")(logs(evaluate.command))
 app.add_typer(figure.app, name="figure")
-app.command("info")(info.command)
-app.command("demo")(demo.command)
-app.command("benchmark")(benchmark.command)
+app.command("info")(logs(info.command))
+app.command("demo")(logs(demo.command))
+app.command("benchmark")(logs(benchmark.command))
 app.add_typer(dataset.app, name="dataset")
-app.command("train")(train.command)
+app.command("train")(logs(train.command))
 
 
 def _print_version(wanted: bool) -> None:
@@ -45,7 +46,8 @@ def _print_version(wanted: bool) -> None:
 def _main(
     context: typer.Context,
     version: Annotated[
-        bool, typer.Option("--version", help="Print the version and exit.", callback=_print_version, is_eager=True)
+        bool,
+        typer.Option("--version", "-V", help="Print the version and exit.", callback=_print_version, is_eager=True),
     ] = False,
 ) -> None:
     """Remesh triangle meshes anisotropically, with as many vertices as you ask for."""

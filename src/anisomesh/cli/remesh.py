@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from functools import partial
 from pathlib import Path
 from typing import Annotated, Any
 
@@ -9,84 +10,117 @@ import typer
 
 from anisomesh.cli.arguments import (
     REMESH_OPTIONS,
-    InputFormat,
     Length,
     Quiet,
     Ratio,
     Source,
     Vertices,
     takes_remesh_options,
+    target_option,
 )
-from anisomesh.cli.job import STANDARD_STREAM, Outputs, check_input_format, read, run_remesh
+from anisomesh.cli.job import (
+    STANDARD_STREAM,
+    Outputs,
+    check_input_format,
+    default_output,
+    read,
+    run_remesh,
+)
 from anisomesh.cli.progress import progress
 from anisomesh.cli.report import as_json, hints, summary
+
+_output = partial(typer.Option, rich_help_panel="Output")
+_input = partial(typer.Option, rich_help_panel="Input")
 
 
 @takes_remesh_options(*REMESH_OPTIONS)
 def command(
     source: Source,
-    out: Annotated[Path, typer.Option("--out", "-o", metavar="OUT", help="Mesh to write; the suffix is the format.")],
-    input_format: InputFormat = None,
-    output_format: Annotated[
-        str | None, typer.Option(metavar="FORMAT", help="Format of OUT, if its suffix does not name it.")
-    ] = None,
     n_vertices: Vertices = None,
     ratio: Ratio = None,
     max_error: Annotated[
         str | None,
-        typer.Option(
+        target_option(
             metavar="LENGTH",
-            help="Use the fewest vertices within this distance of the input, in model units or % of the diagonal.",
+            help="As few vertices as keep within this distance of the input, such as 0.2 or 0.1% of the diagonal.",
         ),
+    ] = None,
+    out: Annotated[
+        Path | None,
+        _output(
+            "--out",
+            "-o",
+            metavar="OUT",
+            help="Mesh to write; the suffix is the format. By default part_remeshed.ply for part.ply; may be IN.",
+        ),
+    ] = None,
+    input_format: Annotated[
+        str | None, _input(metavar="FORMAT", help="Format of IN, if its suffix does not name it: ply, obj, ...")
+    ] = None,
+    output_format: Annotated[
+        str | None, _output(metavar="FORMAT", help="Format of OUT, if its suffix does not name it.")
     ] = None,
     features: Annotated[
         Path | None,
-        typer.Option(metavar="FILE", help="Creases to keep: a text file, two vertex numbers per line, from 0."),
+        _input(metavar="FILE", help="Edges to keep: a text file, two vertex numbers of IN per line, from 0."),
+    ] = None,
+    density: Annotated[
+        Path | None,
+        _input(
+            metavar="FILE",
+            help="Weights of the vertices of IN, larger for smaller triangles: a text file, one number per line.",
+        ),
     ] = None,
     weld: Annotated[
         str | None,
-        typer.Option(
+        _input(
             metavar="LENGTH",
             help="Join points of the input up to this distance, in model units or % of the diagonal; auto: 0.001%.",
         ),
     ] = None,
-    report: Annotated[Path | None, typer.Option(metavar="JSON", help="Write the report to this file.")] = None,
+    report: Annotated[Path | None, _output(metavar="JSON", help="Write the report to this file.")] = None,
     rvd: Annotated[
-        Path | None, typer.Option(metavar="FILE", help="Write the Voronoi cells on the surface: .vtu or .obj.")
+        Path | None, _output(metavar="FILE", help="Write the Voronoi cells on the surface: .vtu or .obj.")
     ] = None,
     picture: Annotated[
         Path | None,
-        typer.Option(metavar="FILE", help="Draw input and result side by side: .png or .pdf (extra: picture)."),
+        _output(metavar="FILE", help="Draw input and result side by side: .png or .pdf (extra: picture)."),
     ] = None,
     json_: Annotated[bool, typer.Option("--json", help="Print the report as JSON and nothing else.")] = False,
     quiet: Quiet = False,
     **options: Any,
 ) -> None:
-    """Remesh IN with anisotropic triangles and write the result to OUT; - is standard input or output."""
+    """Remesh IN with anisotropic triangles. Give -n, --ratio or --max-error; - is standard input or output."""
     if (n_vertices, ratio, max_error).count(None) != 2:
         raise typer.BadParameter("give one of -n (number of vertices), --ratio and --max-error")
     error = None if max_error is None else Length.parse(max_error, "--max-error")
     gap = None if weld in (None, "auto") else Length.parse(weld, "--weld")
+    out = default_output(source, input_format, output_format) if out is None else out
     outputs = Outputs(mesh=out, mesh_format=output_format, report=report, rvd=rvd, picture=picture)
     to_stdout = out == STANDARD_STREAM
     if to_stdout and json_:
         raise typer.BadParameter("-o - and --json both write to standard output; use --report FILE")
     weights = options.get("weights")
     check_input_format(source, input_format)
-    outputs.check(None if source == STANDARD_STREAM else source, features, None if weights is None else Path(weights))
+    others = features, density, None if weights is None else Path(weights)
+    outputs.check(None if source == STANDARD_STREAM else source, *others)
+    if features is not None or density is not None:
+        from anisomesh.io.text_tables import load_numbers, load_pairs
+
+        options["features"] = None if features is None else load_pairs(features)
+        options["density"] = None if density is None else load_numbers(density)
     with progress(quiet) as display:
         surface, seconds = read(source, input_format)
-        if features is not None:
-            from anisomesh.features.tagged import load_pairs
-
-            options["features"] = load_pairs(features)
         options |= {"n_vertices": n_vertices, "ratio": ratio}
         options["max_error"] = None if error is None else error.on(surface)
         if weld is not None:
             options["weld_tolerance"] = "auto" if gap is None else gap.on(surface)
         result, facts = run_remesh(surface, display, name=str(source), load_seconds=seconds, **options)
         facts["hints"] = hints(result.prepared)
-        facts["options"]["features"] = None if features is None else str(features)
+        facts["options"] |= {
+            "features": None if features is None else str(features),
+            "density": None if density is None else str(density),
+        }
         outputs.write(result, facts, display)
     if json_:
         typer.echo(as_json(facts))

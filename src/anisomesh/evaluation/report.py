@@ -13,7 +13,8 @@ from anisomesh.evaluation.boundary import BoundaryDistance, boundary_distance
 from anisomesh.evaluation.preservation import FeaturePreservation, feature_preservation
 from anisomesh.evaluation.sampled import CREASE_ANGLE, DEFAULT_SAMPLES, SampledMeasures, sampled_measures
 from anisomesh.evaluation.shape import ShapeStatistics, quality_in_reference_metric, shape_statistics
-from anisomesh.io.convert import as_surface
+from anisomesh.io.describe import html_table, soundness
+from anisomesh.io.meshes import surface_of
 from anisomesh.mesh.closest_points import ClosestPoints
 from anisomesh.mesh.distance import SurfaceDistance, surface_distance
 from anisomesh.mesh.geometry import unit_frame
@@ -60,6 +61,24 @@ class Evaluation:
     boundary: BoundaryDistance | None
     validity: Validity
 
+    def __repr__(self) -> str:
+        return f"Evaluation({', '.join(f'{name} {text}' for name, text in self._rows())})"
+
+    def _repr_html_(self) -> str:
+        return html_table("Evaluation (lengths at bounding-box diagonal 1)", self._rows())
+
+    def _rows(self) -> list[tuple[str, str]]:
+        """Return the most important measures as names and texts."""
+        return [
+            ("vertices", f"{self.vertices:,}"),
+            ("triangles", f"{self.faces:,}"),
+            ("validity", soundness(self.validity)),
+            ("RMS distance", f"{self.distance.rms:.3g}"),
+            ("largest distance", f"{self.distance.hausdorff:.3g}"),
+            ("mean quality G", f"{self.shape.g_mean:.3f}"),
+            ("creases covered", f"{self.features.crease_covered:.1%}"),
+        ]
+
     def as_dict(self) -> dict[str, Any]:
         """Return all measures as nested dictionaries of numbers, for JSON."""
         return {
@@ -88,8 +107,8 @@ def evaluate(
     Parameters
     ----------
     reference
-        The input surface, as :func:`~anisomesh.io.convert.as_surface` takes it. It is repaired as before a remesh, so
-        that it has an orientation and a topology for comparison.
+        The input surface: the name of a file, or what :func:`~anisomesh.io.convert.as_surface` takes. It is repaired as
+        before a remesh, so that it has an orientation and a topology for comparison.
     result
         The remesh, of the same types and in the same coordinates; it is measured without repair.
     samples
@@ -101,6 +120,8 @@ def evaluate(
 
     Raises
     ------
+    MeshFileError
+        If a file cannot be read.
     MeshError
         If one of the two is not a mesh, or the repaired reference is empty.
     OptionError
@@ -113,10 +134,10 @@ def evaluate(
     samples, seed = whole_number("samples", samples, 1), whole_number("seed", seed, 0)
     if not 0.0 <= real_number("crease_angle", crease_angle) <= 180.0:
         raise OptionError(f"crease_angle = {crease_angle}; expected 0 to 180 degrees")
-    repaired = prepare(as_surface(reference)).surface
+    repaired = prepare(surface_of(reference)).surface
     frame = unit_frame(repaired.points)
     a = repaired.with_points(frame.to_unit(repaired.points))
-    remeshed = as_surface(result)
+    remeshed = surface_of(result)
     b = Surface(frame.to_unit(remeshed.points), remeshed.faces)
     closest = ClosestPoints(a)
     squared = closest.squared_distances(b.points[np.unique(b.faces)])

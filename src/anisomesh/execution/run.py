@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import logging
 import time
 from collections.abc import Iterator
 from contextlib import contextmanager
@@ -9,6 +10,8 @@ from contextlib import contextmanager
 from anisomesh.errors import TimeLimitError
 from anisomesh.execution.deadline import Deadline
 from anisomesh.execution.progress import OnStep, StepInfo
+
+logger = logging.getLogger(__name__)
 
 OPTIMISATION_SHARE = 0.6  # of the time limit, for everything up to the end of the optimisation
 
@@ -27,7 +30,9 @@ class Run:
         self.on_step(StepInfo(stage=name))
         start = time.perf_counter()
         yield
-        self._seconds[name] = self._seconds.get(name, 0.0) + time.perf_counter() - start
+        seconds = time.perf_counter() - start
+        self._seconds[name] = self._seconds.get(name, 0.0) + seconds
+        logger.debug("%s: %.3f s", name, seconds)
 
     def check_time(self) -> None:
         """Raise TimeLimitError if no time is left for the optimisation."""

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import os
-from pathlib import Path
 from typing import Any, Literal
 
 import igl
@@ -12,38 +10,12 @@ import numpy.typing as npt
 from scipy.spatial import cKDTree
 
 from anisomesh._arrays import EdgeMask
-from anisomesh.errors import MeshFileError, OptionError
+from anisomesh.errors import OptionError
 from anisomesh.mesh.surface import Surface
 from anisomesh.mesh.topology import edge_keys
 from anisomesh.repair.near_points import weld_distance
 
-_MAX_DIGITS = 18  # of a decimal number that fits in 64 bits
 _MIN_SEARCH_RADIUS = 1e-12  # times the diagonal of the input: rounding of copied points
-
-
-def load_pairs(path: str | os.PathLike[str]) -> npt.NDArray[np.int64]:
-    """Return the pairs of point indices (n, 2) in a text file: two integers per line, from 0; # begins a comment.
-
-    Raises
-    ------
-    MeshFileError
-        If the file cannot be read, or a line has other content.
-    """
-    try:
-        text = Path(path).read_text(encoding="utf-8")
-    except OSError as error:
-        raise MeshFileError(f"{path}: cannot be read: {error.strerror}") from error
-    except UnicodeDecodeError as error:
-        raise MeshFileError(f"{path}: cannot be read as text; expected two vertex numbers per line") from error
-    pairs = []
-    for number, line in enumerate(text.splitlines(), start=1):
-        words = line.split("#", 1)[0].split()
-        if not words:
-            continue
-        if len(words) != 2 or not all(word.isdecimal() and len(word) < _MAX_DIGITS for word in words):
-            raise MeshFileError(f"{path}, line {number}: {line.strip()[:40]!r}; expected two vertex numbers, from 0")
-        pairs.append([int(word) for word in words])
-    return np.array(pairs, dtype=np.int64).reshape(-1, 2)
 
 
 def tagged_edges(

@@ -11,7 +11,7 @@ from typing import Any, BinaryIO
 import numpy as np
 import numpy.typing as npt
 
-from anisomesh.errors import MeshFileError
+from anisomesh.errors import MeshError, MeshFileError
 from anisomesh.io import polygons
 from anisomesh.io.atomic import atomic_path
 from anisomesh.io.convert import as_surface
@@ -90,6 +90,30 @@ def load(path: str | os.PathLike[str] | BinaryIO, *, file_format: str | None = N
     for remark in remarks:
         logger.warning("%s: %s", name, remark)
     return surface
+
+
+def surface_of(mesh: Any, faces: npt.NDArray[Any] | None = None) -> Surface:
+    """Return a mesh in any form: the name of a file, arrays, or an object of a library.
+
+    Parameters
+    ----------
+    mesh
+        A path, read by :func:`load`, or what :func:`~anisomesh.io.convert.as_surface` takes.
+    faces
+        Triangles (F, 3) if ``mesh`` is an array of points.
+
+    Raises
+    ------
+    MeshFileError
+        If the file cannot be read.
+    MeshError
+        If the object is not a mesh, or there are faces besides a file.
+    """
+    if not isinstance(mesh, str | os.PathLike):
+        return as_surface(mesh, faces)
+    if faces is not None:
+        raise MeshError(f"the mesh is the file {os.fspath(mesh)} and has faces; leave out the second argument")
+    return load(mesh)
 
 
 def _content(path: str | os.PathLike[str] | BinaryIO, file_format: str | None) -> tuple[str, str, bytes]:

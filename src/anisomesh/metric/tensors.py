@@ -187,7 +187,7 @@ def validate_metric(
     MetricError
         If the shape is wrong, or a matrix is not real and finite, not symmetric (to 1e-8 of its largest entry), not
         positive definite or nearly singular (smallest eigenvalue up to 1e-12 of the largest entry), or its largest
-        entry is not between 1e-100 and 1e100; names the first such point.
+        entry is not between 1e-100 and 1e100; counts such points and names the first.
     """
     matrices = real_array("metric", tensors, (surface.n_points, 3, 3), MetricError)
     return validate_tensors(matrices, np.arange(len(matrices)) if numbers is None else numbers, "metric")
@@ -196,11 +196,15 @@ def validate_metric(
 def validate_tensors(matrices: PointTensors, numbers: npt.NDArray[np.integer], name: str) -> PointTensors:
     """Return tensors (n, 3, 3) as exactly symmetric ones; errors as :func:`validate_metric`, with name and numbers."""
 
-    def reject(invalid: npt.ArrayLike, reason: str) -> None:
+    def reject(invalid: npt.ArrayLike, reason: str, eigenvalues: npt.NDArray[np.float64] | None = None) -> None:
         where = np.flatnonzero(invalid)
         if len(where):
+            first = where[np.argmin(numbers[where])]
+            count, total = len(np.unique(numbers[where])), len(np.unique(numbers))
+            spectrum = "" if eigenvalues is None else ", ".join(f"{value:.4g}" for value in eigenvalues[first])
             raise MetricError(
-                f"{name}[{numbers[where[0]]}] = {matrices[where[0]].tolist()} {reason} ({len(where)} such places); "
+                f"{name}[{numbers[first]}] = {matrices[first].tolist()} {reason} "
+                f"({f'eigenvalues {spectrum}; ' if spectrum else ''}like this: {count:,} of {total:,}); "
                 "expected a symmetric positive definite 3x3 matrix everywhere"
             )
 
@@ -210,9 +214,9 @@ def validate_tensors(matrices: PointTensors, numbers: npt.NDArray[np.integer], n
     skew = np.abs(matrices - matrices.transpose(0, 2, 1)).max(axis=(1, 2))
     reject(skew > _MAX_ASYMMETRY * largest, "is not symmetric")
     symmetric = 0.5 * (matrices + matrices.transpose(0, 2, 1))
-    smallest = np.linalg.eigvalsh(symmetric)[:, 0]
-    reject(smallest <= 0.0, "is not positive definite")
-    reject(smallest <= _MIN_CONDITION * largest, f"is nearly singular (below {_MIN_CONDITION:g} in a direction)")
+    eigenvalues = np.linalg.eigvalsh(symmetric)
+    reject(eigenvalues[:, 0] <= 0.0, "is not positive definite", eigenvalues)
+    reject(eigenvalues[:, 0] <= _MIN_CONDITION * largest, "is nearly singular", eigenvalues)
     reject(largest < 1.0 / _LARGEST_ENTRY, f"has no entry above {1 / _LARGEST_ENTRY:g}")
     return np.asarray(symmetric)
 

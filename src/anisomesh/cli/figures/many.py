@@ -2,15 +2,14 @@
 
 from __future__ import annotations
 
-import math
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 from typer.core import TyperCommand
 
-from anisomesh.cli.arguments import COMMON_REMESH_OPTIONS, Quiet, Source, takes_remesh_options
-from anisomesh.cli.figure_options import (
+from anisomesh.cli.arguments import COMMON_REMESH_OPTIONS, Quiet, Source, share, takes_remesh_options
+from anisomesh.cli.figures.options import (
     Direction,
     Out,
     Scale,
@@ -115,18 +114,18 @@ def _vertices(surface: Surface) -> str:
 
 def _is_number(word: str) -> bool:
     try:
-        float(word)
+        float(word.removesuffix("%"))
     except ValueError:
         return False
     return True
 
 
 def _parsed(ratios: str) -> list[float]:
-    """Return the numbers in a text, separated by spaces or commas."""
+    """Return the shares in a text, separated by spaces or commas."""
     words = ratios.replace(",", " ").split()
-    for word in words:
-        if not (_is_number(word) and math.isfinite(float(word)) and float(word) > 0.0):
-            raise typer.BadParameter(f"--ratios: {word} is not a positive finite number")
     if not words:
         raise typer.BadParameter("--ratios: expected at least one number")
-    return [float(word) for word in words]
+    try:
+        return [share(word) for word in words]
+    except typer.BadParameter as error:
+        raise typer.BadParameter(f"--ratios: {error}") from None

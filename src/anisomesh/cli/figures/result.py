@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Annotated, Any, Literal
 import typer
 
 from anisomesh.cli.arguments import COMMON_REMESH_OPTIONS, Quiet, Ratio, Vertices, takes_remesh_options
-from anisomesh.cli.figure_options import (
+from anisomesh.cli.figures.options import (
     Direction,
     Out,
     Scale,

@@ -4,12 +4,13 @@ from __future__ import annotations
 
 import typer
 
-from anisomesh.cli import figure_many, figure_result
+from anisomesh.cli.figures import many, result
+from anisomesh.cli.log import logs
 
 app = typer.Typer(add_completion=False)
-app.command("result")(figure_result.command)
-app.command("gallery")(figure_many.gallery)
-app.command("strip", cls=figure_many.StripCommand)(figure_many.strip)
+app.command("result")(logs(result.command))
+app.command("gallery")(logs(many.gallery))
+app.command("strip", cls=many.StripCommand)(logs(many.strip))
 
 
 @app.callback(invoke_without_command=True)

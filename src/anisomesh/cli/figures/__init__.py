@@ -1,0 +1,1 @@
+"""``anisomesh figure``: the group, its commands, and what they share."""

@@ -1,0 +1,79 @@
+"""``mesh.anisomesh.remesh(...)`` on meshes of PyVista, which imports this module when the name is first used.
+
+PyVista 0.48 and newer finds the module by the entry point ``pyvista.accessors``; older ones do not look for it.
+"""
+
+from __future__ import annotations
+
+import logging
+from typing import TYPE_CHECKING, Any
+
+import pyvista
+
+from anisomesh.evaluation.report import Evaluation
+from anisomesh.evaluation.report import evaluate as evaluate_meshes
+from anisomesh.pipeline import remesh as remesh_mesh
+
+if TYPE_CHECKING:
+    from anisomesh.mesh.surface import Surface
+
+logger = logging.getLogger(__name__)
+
+
+class Accessor:
+    """The functions of anisomesh as methods of a mesh of PyVista, under ``mesh.anisomesh``.
+
+    Parameters
+    ----------
+    mesh
+        The mesh, a ``pyvista.PolyData`` or ``pyvista.UnstructuredGrid``. It is not changed.
+    """
+
+    def __init__(self, mesh: Any) -> None:
+        self._mesh = mesh
+
+    def remesh(self, n_vertices: int | None = None, **options: Any) -> Any:
+        """Return the mesh remeshed anisotropically, without its point and cell data.
+
+        Parameters
+        ----------
+        n_vertices
+            Vertices of the result, at least 4; leave it out to give ``ratio`` or ``max_error``.
+        **options
+            The other arguments of :func:`anisomesh.pipeline.remesh`.
+
+        Returns
+        -------
+        pyvista.PolyData
+            The result. What a user should know about it is logged as warnings;
+            :func:`~anisomesh.pipeline.remesh` takes the mesh as well and returns everything else too.
+
+        Raises
+        ------
+        AnisomeshError
+            As :func:`~anisomesh.pipeline.remesh`.
+        """
+        result = remesh_mesh(self._mesh, n_vertices=n_vertices, **options)
+        for text in result.warnings:
+            logger.warning("%s", text)
+        return _poly_data(result.surface)
+
+    def evaluate(self, result: Any, **options: Any) -> Evaluation:
+        """Measure a remesh against this mesh.
+
+        Parameters
+        ----------
+        result
+            The remesh, in the same coordinates.
+        **options
+            The other arguments of :func:`anisomesh.evaluation.report.evaluate`.
+        """
+        return evaluate_meshes(self._mesh, result, **options)
+
+
+def _poly_data(surface: Surface) -> Any:
+    return pyvista.PolyData.from_regular_faces(surface.points, surface.faces)
+
+
+for _kind in (pyvista.PolyData, pyvista.UnstructuredGrid):
+    pyvista.register_dataset_accessor("anisomesh", _kind)(Accessor)
