@@ -168,6 +168,8 @@ def test_moments_are_restored_to_their_parameters_where_some_have_none(tmp_path)
         (PaperOptions, {"ratio": 1.5}),
         (PaperOptions, {"levels": -1}),
         (PaperOptions, {"channels": 0}),
+        (PaperOptions, {"skip": "none"}),
+        (PaperOptions, {"norm": "layer"}),
     ],
 )
 def test_invalid_network_sizes_are_refused(kind, sizes):

@@ -5,13 +5,17 @@ import pytest
 
 torch = pytest.importorskip("torch")
 
+from anisomesh.learn.architecture import SKIPS  # noqa: E402
 from anisomesh.learn.data.items import Item  # noqa: E402
 from anisomesh.learn.models.paper import (  # noqa: E402
+    BatchNorm,
+    PaperBlock,
     PaperConvolution,
     PaperNetwork,
     PaperOptions,
     TopKPooling,
     interpolated,
+    joined,
     paper_input,
 )
 from anisomesh.learn.training.config import TrainingOptions  # noqa: E402
@@ -60,9 +64,10 @@ def test_the_convolution_is_the_formula_of_the_paper():
 def test_pooling_keeps_the_nodes_of_largest_score():
     pool = TopKPooling(3, 0.5)
     x = torch.randn(11, 3)
-    values, kept = pool(x)
+    values, kept, counts = pool(x, (11,))
     score = x @ pool.direction / pool.direction.norm()
     assert len(kept) == 6
+    assert counts == (6,)
     assert score[kept].min() >= score[np.setdiff1d(np.arange(11), kept)].max()
     torch.testing.assert_close(values, x[kept] * torch.tanh(score[kept])[:, None])
 
@@ -85,6 +90,76 @@ def test_the_network_ignores_the_order_of_points_and_faces():
         mine, theirs = network(paper_input(surface)), network(paper_input(other))
     assert mine.shape == (surface.n_points, 5)
     torch.testing.assert_close(theirs, mine[order], atol=1e-4, rtol=1e-4)
+
+
+@pytest.mark.parametrize("skip", SKIPS)
+def test_the_block_is_the_formula_of_the_paper(skip):
+    torch.manual_seed(0)
+    block = PaperBlock(6, PaperOptions(channels=5, skip=skip)).double()
+    x, graph = torch.randn(9, 6, dtype=torch.float64), None
+    first, second = torch.nn.Linear(6, 5, dtype=torch.float64), torch.nn.Linear(5, 5, dtype=torch.float64)
+    block.first, block.second = (Mapped(layer) for layer in (first, second))
+
+    def normalised(values):
+        return (values - values.mean(dim=0)) / torch.sqrt(values.var(dim=0, unbiased=False) + 1e-5)
+
+    def leaky(values):
+        return torch.where(values > 0, values, 0.1 * values)
+
+    inner = normalised(second(leaky(normalised(first(x)))))
+    wanted = leaky(inner + block.skip(x)) if skip == "before" else leaky(inner) + block.skip(x)
+    torch.testing.assert_close(block(x, graph, (9,)), wanted)
+
+
+class Mapped(torch.nn.Module):
+    """A linear map in place of a convolution."""
+
+    def __init__(self, layer):
+        super().__init__()
+        self.layer = layer
+
+    def forward(self, x, graph):
+        return self.layer(x)
+
+
+def test_a_batch_norm_normalises_by_the_batch_and_then_by_running_means():
+    torch.manual_seed(0)
+    norm, theirs = BatchNorm(4), torch.nn.BatchNorm1d(4)
+    for n in (30, 7, 12):
+        x = 3.0 + 2.0 * torch.randn(n, 4)
+        torch.testing.assert_close(norm(x), theirs(x))
+    x = torch.randn(5, 4)
+    torch.testing.assert_close(norm.eval()(x), theirs.eval()(x))
+    before = norm.train().mean.clone()
+    torch.testing.assert_close(norm(x[:1]), torch.zeros(1, 4))
+    torch.testing.assert_close(norm.mean, before)
+
+
+def batch_of_three():
+    surfaces = [shaken(sphere(1)), shaken(torus(n_major=24, n_minor=10)), shaken(sphere(0))]
+    return [paper_input(surface) for surface in surfaces]
+
+
+@pytest.mark.parametrize(("norm", "training"), [("mesh", True), ("mesh", False), ("batch", False)])
+def test_meshes_of_a_batch_do_not_see_each_other_but_for_batch_norms(norm, training):
+    torch.manual_seed(0)
+    network = PaperNetwork(PaperOptions(channels=8, levels=3, norm=norm)).train(training)
+    inputs = batch_of_three()
+    with torch.no_grad():
+        alone = torch.cat([network(one) for one in inputs])
+        together = network(joined(inputs))
+    torch.testing.assert_close(together, alone, atol=1e-5, rtol=1e-4)
+
+
+def test_batch_norms_see_the_whole_batch():
+    torch.manual_seed(0)
+    network = PaperNetwork(PaperOptions(channels=8, levels=0))
+    inputs = batch_of_three()
+    seen = {}
+    network.bottom.norms[0].register_forward_hook(lambda module, given, out: seen.update(out=out.clone()))
+    network(joined(inputs))
+    assert len(seen["out"]) == sum(len(one.values) for one in inputs)
+    torch.testing.assert_close(seen["out"].mean(dim=0), torch.zeros(8), atol=1e-5, rtol=0)
 
 
 def test_all_weights_of_the_network_take_part():
