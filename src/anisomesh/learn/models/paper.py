@@ -134,7 +134,7 @@ class PaperBlock(nn.Module):
         if self.options.norm == "batch" or len(sizes) == 1:
             whole: Tensor = self.norms[k](x)
             return whole
-        return torch.cat([self.norms[k](part) for part in x.split(sizes)])
+        return torch.cat([self.norms[k](part) for part in torch.split_with_sizes(x, sizes)])
 
 
 class TopKPooling(nn.Module):
@@ -150,7 +150,7 @@ class TopKPooling(nn.Module):
         score = x @ self.direction / self.direction.norm()
         counts = tuple(max(1, int(np.ceil(self.ratio * size))) for size in sizes)
         chosen, start = [], 0
-        for part, n in zip(score.split(sizes), counts, strict=True):
+        for part, n in zip(torch.split_with_sizes(score, sizes), counts, strict=True):
             chosen.append(start + torch.sort(torch.topk(part, n).indices).values)
             start += len(part)
         kept = torch.cat(chosen)
@@ -201,8 +201,9 @@ class PaperNetwork(nn.Module):
 def _interpolated_by_mesh(x: Tensor, level: PaperInput, kept: npt.NDArray[np.int64], counts: Sizes) -> Tensor:
     """Return values (V, C) at the points of a level from values (V', C) at the kept ones, each mesh by itself."""
     starts, ends = np.cumsum([0, *level.sizes[:-1]]), np.cumsum(counts)[:-1]
-    parts = zip(x.split(counts), np.split(level.points, starts[1:]), np.split(kept, ends), starts, strict=True)
-    return torch.cat([interpolated(values, points, chosen - start) for values, points, chosen, start in parts])
+    values = torch.split_with_sizes(x, counts)
+    parts = zip(values, np.split(level.points, starts[1:]), np.split(kept, ends), starts, strict=True)
+    return torch.cat([interpolated(part, points, chosen - start) for part, points, chosen, start in parts])
 
 
 def interpolated(x: Tensor, points: npt.NDArray[np.float64], kept: npt.NDArray[np.int64]) -> Tensor:
