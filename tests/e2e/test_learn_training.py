@@ -18,6 +18,8 @@ torch = pytest.importorskip("torch")
 from tensorboard.backend.event_processing.event_accumulator import EventAccumulator  # noqa: E402
 
 import anisomesh  # noqa: E402
+from anisomesh.bench.suite import parse_suite  # noqa: E402
+from anisomesh.bench.training import train_networks  # noqa: E402
 from anisomesh.errors import OptionError  # noqa: E402
 from anisomesh.features.detect import WEAK_ANGLE, sharp_edges  # noqa: E402
 from anisomesh.learn.architecture import NetworkOptions, PaperOptions  # noqa: E402
@@ -375,6 +377,34 @@ def test_the_command_trains_stops_and_resumes(files, tmp_path, run_cli):
     assert done.stdout.startswith("40 epochs; wrote")
     assert f"epoch {before + 1}:" in done.stderr
     assert f"epoch {before}:" not in done.stderr
+
+
+@pytest.mark.slow
+def test_networks_of_a_suite_are_trained_in_stretches(item_folder, tmp_path):
+    training = {"epochs": 2, "batch": 2, "noise_share": 0.0, "paper": {"channels": 8, "levels": 2}}
+    methods = [
+        {"name": f"w {weight}", "method": "anisomesh", "training": {**training, "laplacian": weight}}
+        for weight in (0.1, 0.5)
+    ]
+    suite = parse_suite("tiny", {"shapes": ["sphere:100"], "methods": methods})
+    whole = train_networks(suite, tmp_path / "whole", item_folder)
+    told = []
+
+    def stop(text):
+        told.append(text)
+        if len(told) in (1, 3):  # in the first network and, when that is done, in the second
+            os.kill(os.getpid(), signal.SIGTERM)
+
+    for _ in range(2):
+        with pytest.raises(KeyboardInterrupt):
+            train_networks(suite, tmp_path / "cut", item_folder, stop)
+    found = train_networks(suite, tmp_path / "cut", item_folder, stop)
+    assert [text.split(" of")[0] for text in told] == [
+        f"w {weight}: epoch {n}" for weight in (0.1, 0.5) for n in (1, 2)
+    ]
+    for name, path in found.items():
+        for mine, theirs in zip(*(load_weights(file)[0].parameters() for file in (path, whole[name])), strict=True):
+            torch.testing.assert_close(mine, theirs, rtol=0, atol=0)
 
 
 @pytest.mark.slow
