@@ -18,6 +18,8 @@ torch = pytest.importorskip("torch")
 from tensorboard.backend.event_processing.event_accumulator import EventAccumulator  # noqa: E402
 
 import anisomesh  # noqa: E402
+from anisomesh.bench.suite import parse_suite  # noqa: E402
+from anisomesh.bench.training import train_networks  # noqa: E402
 from anisomesh.errors import OptionError  # noqa: E402
 from anisomesh.features.detect import WEAK_ANGLE, sharp_edges  # noqa: E402
 from anisomesh.learn.architecture import NetworkOptions, PaperOptions  # noqa: E402
@@ -27,8 +29,16 @@ from anisomesh.learn.inference.predict import predict  # noqa: E402
 from anisomesh.learn.inference.pretrained import weights_path  # noqa: E402
 from anisomesh.learn.models.checkpoint import load_state, load_weights, save_state  # noqa: E402
 from anisomesh.learn.training.config import TrainingOptions, load_training  # noqa: E402
-from anisomesh.learn.training.run import CHECKPOINT, EVENTS, METRICS, WEIGHTS, DivergedError  # noqa: E402
-from anisomesh.learn.training.tasks import StretchTask  # noqa: E402
+from anisomesh.learn.training.processes import TrainingProcess  # noqa: E402
+from anisomesh.learn.training.run import (  # noqa: E402
+    CHECKPOINT,
+    EVENTS,
+    METRICS,
+    WEIGHTS,
+    DivergedError,
+    TrainingRun,
+)
+from anisomesh.learn.training.tasks import EmbeddingTask, StretchTask, task_of  # noqa: E402
 from anisomesh.learn.training.train import train  # noqa: E402
 from anisomesh.learn.weights_file import WeightsError  # noqa: E402
 from anisomesh.mesh.geometry import unit_frame  # noqa: E402
@@ -97,11 +107,11 @@ def test_a_run_that_was_stopped_in_its_validation_goes_on(files, uninterrupted, 
     whole, _ = uninterrupted(NETWORK)
     example, seen = StretchTask.example, []
 
-    def stopping(task, item, noise, rng, *, training):
+    def stopping(task, item, noise, rng, *, training, **given):
         seen.append(training)
         if not training and seen.count(False) == 8:
             os.kill(os.getpid(), signal.SIGTERM)
-        return example(task, item, noise, rng, training=training)
+        return example(task, item, noise, rng, training=training, **given)
 
     monkeypatch.setattr(StretchTask, "example", stopping)
     with pytest.raises(KeyboardInterrupt):
@@ -109,6 +119,51 @@ def test_a_run_that_was_stopped_in_its_validation_goes_on(files, uninterrupted, 
     assert seen.count(False) == 8  # the rest of the validation waits
     assert losses(train(options(tmp_path / "cut"), files, resume=True)) == losses(whole)
     assert seen.count(True) == 4 * len(files.training)  # no step was made twice
+
+
+class PowerCutError(BaseException):
+    """Ends a run at once, without the checkpoint that a signal leaves."""
+
+
+@pytest.mark.slow
+def test_a_run_of_the_paper_that_was_killed_goes_on_from_its_last_checkpoint(files, tmp_path, monkeypatch):
+    """Batch norms, all symmetries and halved rates; killed in the middle of the second of three epochs."""
+    paper = partial(
+        options, network=PAPER, epochs=3, batch=6, schedule="halving", symmetries="all", warmup=0, gauge="raw"
+    )
+    whole = train(paper(tmp_path / "whole"), files)
+    losses_of, calls = EmbeddingTask.training_losses, []
+    steps = -(-10 * len(files.training) // 6)
+
+    def cut(task, network, examples):
+        calls.append(None)
+        if len(calls) == steps + steps // 2:
+            raise PowerCutError
+        return losses_of(task, network, examples)
+
+    monkeypatch.setattr(EmbeddingTask, "training_losses", cut)
+    with pytest.raises(PowerCutError):
+        train(paper(tmp_path / "cut"), files)
+    assert losses(train(paper(tmp_path / "cut"), files, resume=True)) == losses(whole)
+    assert len(calls) == 3 * steps + steps // 2  # half an epoch was done twice
+    for name, value in weights(tmp_path / "whole").items():
+        torch.testing.assert_close(weights(tmp_path / "cut")[name], value, rtol=0, atol=0)
+
+
+@pytest.mark.parametrize(("epochs", "steps"), [(600, 3), (6, 4), (4, 10)])
+def test_halved_rates_are_constant_for_a_sixth_of_the_run(epochs, steps, tmp_path):
+    files = ItemFiles(training=[Path(str(k)) for k in range(2 * steps)], validation=[])
+    given = options(tmp_path, epochs=epochs, schedule="halving", rate=0.01, warmup=0, network=PAPER)
+    task = task_of(given)
+    network = task.network()
+    run = TrainingRun(given, task, files, network, torch.optim.AdamW(network.parameters()), TrainingProcess())
+    rates = [run.rate(step) for step in range(epochs * steps)]
+    values, counts = np.unique(rates, return_counts=True)
+    np.testing.assert_allclose(values[::-1], 0.01 * 0.5 ** np.arange(6))
+    assert np.ptp(counts) <= 1
+    assert rates == sorted(rates, reverse=True)
+    if epochs == 600:
+        assert [run.rate(steps * epoch) for epoch in (0, 99, 100, 599)] == [0.01, 0.01, 0.005, 0.01 / 32]
 
 
 @pytest.mark.slow
@@ -168,6 +223,8 @@ def test_moments_are_restored_to_their_parameters_where_some_have_none(tmp_path)
         (PaperOptions, {"ratio": 1.5}),
         (PaperOptions, {"levels": -1}),
         (PaperOptions, {"channels": 0}),
+        (PaperOptions, {"skip": "none"}),
+        (PaperOptions, {"norm": "layer"}),
     ],
 )
 def test_invalid_network_sizes_are_refused(kind, sizes):
@@ -258,6 +315,10 @@ CONFIG = (
         (CONFIG.replace("epochs", 'loss = "l3"\nepochs'), "loss = 'l3'; expected one of dot, l2, cosine"),
         (CONFIG.replace("epochs", 'gauge = "round"\nepochs'), "gauge = 'round'; expected one of aligned, raw"),
         (CONFIG.replace("epochs", "augment = 1\nepochs"), "augment = 1; expected bool"),
+        (CONFIG.replace("epochs", "loss = 1\nepochs"), "loss = 1; expected str"),
+        (CONFIG.replace("epochs", 'schedule = "step"\nepochs'), "schedule = 'step'; expected one of cosine, halving"),
+        (CONFIG.replace("epochs", 'symmetries = "ten"\nepochs'), "symmetries = 'ten'; expected one of one, all"),
+        (CONFIG.replace("epochs", 'laplacian_scale = "own"\nepochs'), "laplacian_scale = 'own'; expected one of paper"),
     ],
 )
 def test_wrong_configurations_say_what_is_meant(tmp_path, text, words):
@@ -316,6 +377,34 @@ def test_the_command_trains_stops_and_resumes(files, tmp_path, run_cli):
     assert done.stdout.startswith("40 epochs; wrote")
     assert f"epoch {before + 1}:" in done.stderr
     assert f"epoch {before}:" not in done.stderr
+
+
+@pytest.mark.slow
+def test_networks_of_a_suite_are_trained_in_stretches(item_folder, tmp_path):
+    training = {"epochs": 2, "batch": 2, "noise_share": 0.0, "paper": {"channels": 8, "levels": 2}}
+    methods = [
+        {"name": f"w {weight}", "method": "anisomesh", "training": {**training, "laplacian": weight}}
+        for weight in (0.1, 0.5)
+    ]
+    suite = parse_suite("tiny", {"shapes": ["sphere:100"], "methods": methods})
+    whole = train_networks(suite, tmp_path / "whole", item_folder)
+    told = []
+
+    def stop(text):
+        told.append(text)
+        if len(told) in (1, 3):  # in the first network and, when that is done, in the second
+            os.kill(os.getpid(), signal.SIGTERM)
+
+    for _ in range(2):
+        with pytest.raises(KeyboardInterrupt):
+            train_networks(suite, tmp_path / "cut", item_folder, stop)
+    found = train_networks(suite, tmp_path / "cut", item_folder, stop)
+    assert [text.split(" of")[0] for text in told] == [
+        f"w {weight}: epoch {n}" for weight in (0.1, 0.5) for n in (1, 2)
+    ]
+    for name, path in found.items():
+        for mine, theirs in zip(*(load_weights(file)[0].parameters() for file in (path, whole[name])), strict=True):
+            torch.testing.assert_close(mine, theirs, rtol=0, atol=0)
 
 
 @pytest.mark.slow

@@ -1,6 +1,7 @@
 """Networks in NumPy against the ones in torch, whose weights they read."""
 
 import json
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -8,7 +9,7 @@ import pytest
 torch = pytest.importorskip("torch")
 
 from anisomesh._kernels.products import add_product  # noqa: E402
-from anisomesh.learn.architecture import NetworkOptions, PaperOptions  # noqa: E402
+from anisomesh.learn.architecture import NORMS, SKIPS, NetworkOptions, PaperOptions  # noqa: E402
 from anisomesh.learn.graphs.hierarchy import graph_hierarchy  # noqa: E402
 from anisomesh.learn.inference.layers import sums_at_nodes  # noqa: E402
 from anisomesh.learn.inference.on_device import network_on  # noqa: E402
@@ -34,6 +35,8 @@ def with_random_weights(network, seed):
     with torch.no_grad():
         for values in network.parameters():
             values.copy_(torch.randn(values.shape, generator=generator) / max(values.shape[-1], 1) ** 0.5)
+        for values in network.buffers():  # means and variances of norms
+            values.copy_(values + 0.5 * torch.rand(values.shape, generator=generator))
     return network.eval()
 
 
@@ -65,9 +68,10 @@ def test_the_default_network_is_the_one_of_torch(surface, seed):
 
 
 @pytest.mark.parametrize("surface", SURFACES)
-@pytest.mark.parametrize("seed", range(2))
-def test_the_network_of_the_paper_is_the_one_of_torch(surface, seed):
-    options = PaperOptions(channels=12 + seed, levels=2 + seed)
+@pytest.mark.parametrize(("seed", "skip"), list(enumerate(SKIPS)))
+@pytest.mark.parametrize("norm", NORMS)
+def test_the_network_of_the_paper_is_the_one_of_torch(surface, seed, skip, norm):
+    options = PaperOptions(channels=12 + seed, levels=3 * seed, skip=skip, norm=norm)
     network = with_random_weights(PaperNetwork(options), seed)
     shape = SURFACES[surface]()
     extra = PaperInference(options, arrays_of(network))(shape)
@@ -129,6 +133,21 @@ def test_a_file_is_read_as_torch_wrote_it(tmp_path):
         np.testing.assert_array_equal(weights.arrays[name], value.numpy())
     again, _ = load_weights(tmp_path / "w.safetensors")
     assert all(torch.equal(a, b) for a, b in zip(again.parameters(), network.parameters(), strict=True))
+
+
+def test_a_file_of_the_paper_network_keeps_its_options_and_an_old_one_its_meaning(tmp_path):
+    path = tmp_path / "w.safetensors"
+    options = PaperOptions(channels=4, levels=1, skip="before", norm="mesh")
+    save_weights(with_random_weights(PaperNetwork(options), 0), path, {})
+    assert read_weights(path).options == options
+    data = path.read_bytes()
+    length = int.from_bytes(data[:8], "little")
+    table = json.loads(data[8 : 8 + length])
+    table["__metadata__"]["network"] = '{"channels": 4, "levels": 1, "ratio": 0.5}'  # before there were skip and norm
+    head = json.dumps(table).encode()
+    path.write_bytes(len(head).to_bytes(8, "little") + head + data[8 + length :])
+    assert read_weights(path).options == replace(options, skip="after")
+    assert read_weights(weights_path("paper")).options == PaperOptions(channels=64, skip="after", norm="mesh")
 
 
 def test_damaged_files_are_refused(tmp_path):

@@ -33,6 +33,9 @@ EDGES_PER_CHUNK = 8_192
 PAPER_INPUTS, PAPER_OUTPUTS = 6, 5
 """Numbers of coordinates into the paper's network (points and normals) and out of it (beyond the first three)."""
 
+SKIPS, NORMS = ("before", "after"), ("batch", "mesh")
+"""Values of the options ``skip`` and ``norm`` of the paper's network; the first of each is the paper's."""
+
 DISTANCE_SOFTENING = 1e-12
 """Squared units of features: keeps the root of a squared distance differentiable where features are equal."""
 
@@ -78,11 +81,18 @@ class PaperOptions:
         Number of poolings.
     ratio
         Share of the nodes that a pooling keeps.
+    skip
+        Whether a residual block adds its input ``"before"`` the second activation, as in the paper, or ``"after"`` it.
+    norm
+        What channels are normalised over: ``"batch"``, all nodes of a batch in training and running means in inference,
+        as in the paper, or ``"mesh"``, the nodes of one mesh in both.
     """
 
     channels: int = 64
     levels: int = 5
     ratio: float = 0.5
+    skip: str = SKIPS[0]
+    norm: str = NORMS[0]
 
     def __post_init__(self) -> None:
         whole = isinstance(self.channels, int) and isinstance(self.levels, int)
@@ -91,3 +101,6 @@ class PaperOptions:
                 f"[paper] channels = {self.channels}, levels = {self.levels}, ratio = {self.ratio}; "
                 "expected at least 1 channel, no negative number of levels, and a ratio above 0 and at most 1"
             )
+        for name, known in (("skip", SKIPS), ("norm", NORMS)):
+            if getattr(self, name) not in known:
+                raise OptionError(f"[paper] {name} = {getattr(self, name)!r}; expected one of {', '.join(known)}")

@@ -26,6 +26,9 @@ OPTIONS_OF_KIND: dict[str, type[NetworkOptions] | type[PaperOptions]] = {
 }
 """Class of the options for each kind of network in a file of weights."""
 
+_IMPLIED: dict[str, dict[str, str]] = {"paper": {"skip": "after", "norm": "mesh"}}
+"""For each kind, the values that options had before they existed; files that lack them were written then."""
+
 
 class WeightsError(AnisomeshError):
     """A file of weights or a checkpoint cannot be read, or is of another network."""
@@ -60,7 +63,8 @@ def read_weights(path: Path) -> Weights:
     """
     arrays, header = read_safetensors(path)
     try:
-        options = OPTIONS_OF_KIND[header["kind"]](**json.loads(header["network"]))
+        kind, written = header["kind"], json.loads(header["network"])
+        options = OPTIONS_OF_KIND[kind](**{**_IMPLIED.get(kind, {}), **written})
         return Weights(options=options, arrays=arrays, facts=json.loads(header["facts"]))
     except (KeyError, TypeError, ValueError, OptionError) as error:
         raise WeightsError(f"{path}: does not hold the weights of a known network: {error}") from error

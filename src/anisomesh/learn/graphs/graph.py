@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any, NamedTuple
 
@@ -90,6 +91,19 @@ def mesh_graph(surface: Surface) -> Graph:
     """Return the graph of the points and edges of a surface, with one feature per edge, zero."""
     start, end = np.concatenate([surface.edges, surface.edges[:, ::-1]]).T
     return graph_from_edges(surface.n_points, start, end, np.zeros((len(start), 1), dtype=np.float32))
+
+
+def disjoint_union(graphs: Sequence[Graph]) -> Graph:
+    """Return the graphs as one without edges between them; nodes are numbered in the order of the graphs."""
+    starts = np.cumsum([0, *(graph.n_nodes for graph in graphs)])
+    edges = np.cumsum([0, *(len(graph.neighbour) for graph in graphs)])
+    first = [graph.first[:-1] + start for graph, start in zip(graphs, edges, strict=False)]
+    neighbour = [graph.neighbour + start for graph, start in zip(graphs, starts, strict=False)]
+    return Graph(
+        first=np.concatenate([*first, edges[-1:]]).astype(np.int32),
+        neighbour=np.concatenate(neighbour).astype(np.int32),
+        features=np.concatenate([graph.features for graph in graphs]),
+    )
 
 
 def coarsen(graph: Graph, positions: npt.NDArray[np.float64], n_levels: int) -> list[CoarseningLevel]:

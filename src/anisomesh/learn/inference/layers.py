@@ -24,9 +24,10 @@ def linear_shapes(name: str, inputs: int, outputs: int, *, bias: bool = True) ->
     return shapes | {f"{name}.bias": (outputs,)} if bias else shapes
 
 
-def norm_shapes(name: str, channels: int) -> Shapes:
-    """Return the shapes of the arrays of :meth:`Layers.mesh_norm`."""
-    return {f"{name}.scale": (channels,), f"{name}.shift": (channels,)}
+def norm_shapes(name: str, channels: int, *, running: bool = False) -> Shapes:
+    """Return the shapes of the arrays of :meth:`Layers.mesh_norm` or, with ``running``, :meth:`Layers.batch_norm`."""
+    names = ("scale", "shift", "mean", "variance") if running else ("scale", "shift")
+    return {f"{name}.{part}": (channels,) for part in names}
 
 
 class Layers:
@@ -80,6 +81,16 @@ class Layers:
         """Return channels normalised to mean 0 and variance 1 over the nodes of a mesh, scaled and shifted."""
         centre = x.mean(axis=0, dtype=np.float64)
         variance = np.square(x - centre.astype(np.float32)).mean(axis=0, dtype=np.float64)
+        return self._normalised(name, x, centre, variance)
+
+    def batch_norm(self, name: str, x: Floats) -> Floats:
+        """Return channels normalised by the mean and variance that training found, scaled and shifted."""
+        centre, variance = (self._arrays[f"{name}.{part}"].astype(np.float64) for part in ("mean", "variance"))
+        return self._normalised(name, x, centre, variance)
+
+    def _normalised(
+        self, name: str, x: Floats, centre: npt.NDArray[np.float64], variance: npt.NDArray[np.float64]
+    ) -> Floats:
         factor = self._arrays[f"{name}.scale"] / np.sqrt(variance + NORM_EPSILON)
         shift = self._arrays[f"{name}.shift"] - centre * factor
         return np.asarray(x * factor.astype(np.float32) + shift.astype(np.float32))

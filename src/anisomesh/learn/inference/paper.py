@@ -18,18 +18,21 @@ from anisomesh.mesh.surface import Surface
 def paper_shapes(options: PaperOptions) -> Shapes:
     """Return the shapes of the arrays of the network."""
     c = options.channels
-    shapes = _block_shapes("bottom", c, c) | linear_shapes("out", c, PAPER_OUTPUTS)
+    shapes = _block_shapes("bottom", c if options.levels else PAPER_INPUTS, options)
+    shapes |= linear_shapes("out", c, PAPER_OUTPUTS)
     for k in range(options.levels):
-        shapes |= _block_shapes(f"down.{k}", PAPER_INPUTS if k == 0 else c, c) | _block_shapes(f"up.{k}", c, c)
+        shapes |= _block_shapes(f"down.{k}", PAPER_INPUTS if k == 0 else c, options)
+        shapes |= _block_shapes(f"up.{k}", c, options)
         shapes |= {f"pools.{k}.direction": (c,)}
     return shapes
 
 
-def _block_shapes(name: str, inputs: int, channels: int) -> Shapes:
+def _block_shapes(name: str, inputs: int, options: PaperOptions) -> Shapes:
+    channels, running = options.channels, options.norm == "batch"
     shapes: Shapes = {} if inputs == channels else linear_shapes(f"{name}.skip", inputs, channels)
     for k, (convolution, width) in enumerate((("first", inputs), ("second", channels))):
         part = f"{name}.{convolution}"
-        shapes |= {f"{part}.away": (1, channels)} | norm_shapes(f"{name}.norms.{k}", channels)
+        shapes |= {f"{part}.away": (1, channels)} | norm_shapes(f"{name}.norms.{k}", channels, running=running)
         for own in ("sent", "own"):
             shapes |= linear_shapes(f"{part}.{own}", width, channels, bias=False)
         shapes |= linear_shapes(f"{part}.out", width + channels, channels)
@@ -72,14 +75,13 @@ class PaperInference:
         return self._layers.linear("out", x)
 
     def _block(self, name: str, x: Floats, graph: Graph) -> Floats:
-        """Return (V, C): two times convolution, norm and leaky rectifier, with a skip connection."""
-        layers, inner = self._layers, x
-        for k, convolution in enumerate(("first", "second")):
-            inner = leaky(
-                layers.mesh_norm(f"{name}.norms.{k}", self._convolution(f"{name}.{convolution}", inner, graph))
-            )
-        same = x.shape[1] == inner.shape[1]
-        return inner + (x if same else layers.linear(f"{name}.skip", x))
+        """Return (V, C): two times convolution and norm, a leaky rectifier after each, and a skip connection."""
+        layers = self._layers
+        norm = layers.batch_norm if self.options.norm == "batch" else layers.mesh_norm
+        inner = leaky(norm(f"{name}.norms.0", self._convolution(f"{name}.first", x, graph)))
+        inner = norm(f"{name}.norms.1", self._convolution(f"{name}.second", inner, graph))
+        skipped = x if x.shape[1] == inner.shape[1] else layers.linear(f"{name}.skip", x)
+        return leaky(inner + skipped) if self.options.skip == "before" else leaky(inner) + skipped
 
     def _convolution(self, name: str, x: Floats, graph: Graph) -> Floats:
         """Return (V, C): a map of the features and the maximum of the messages from the neighbours."""

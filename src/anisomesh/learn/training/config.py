@@ -9,8 +9,16 @@ from typing import Any
 from anisomesh.errors import OptionError
 from anisomesh.learn.architecture import NetworkOptions, PaperOptions
 from anisomesh.learn.inference.pretrained import configuration_path, pretrained_configurations, pretrained_networks
-from anisomesh.learn.training.losses import LOSSES
+from anisomesh.learn.training.losses import LAPLACIAN_SCALES, LOSSES
 from anisomesh.toml import check_keys, read_toml
+
+_CHOICES: dict[str, tuple[str, ...]] = {
+    "schedule": ("cosine", "halving"),
+    "loss": LOSSES,
+    "laplacian_scale": LAPLACIAN_SCALES,
+    "gauge": ("aligned", "raw"),
+    "symmetries": ("one", "all"),
+}
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -27,8 +35,9 @@ class TrainingOptions:
         Number of passes over the training items.
     batch
         Items per optimisation step.
-    rate, warmup
-        Largest learning rate of AdamW, reached after ``warmup`` steps; then it falls to zero along a cosine.
+    rate, warmup, schedule
+        Largest learning rate of AdamW, reached after ``warmup`` steps. It falls to zero along a ``"cosine"``, or by
+        ``"halving"`` after each sixth of the steps, as in the paper.
     weight_decay, clip
         Weight decay of AdamW, and the norm that gradients are clipped to.
     noise, noise_share
@@ -41,10 +50,17 @@ class TrainingOptions:
         A torch device, or ``"auto"``: a GPU if there is one, else the CPU.
     network
         Sizes of the default network or of the paper's; table ``[network]`` or ``[paper]`` of a file.
-    loss, laplacian, gauge, augment
-        For the paper's network: loss ``"dot"``, ``"l2"`` or ``"cosine"``; weight of the Laplacian loss; whether the
-        target of that loss is first ``"aligned"`` to the prediction, or used ``"raw"`` as in the paper; and whether
-        items are mirrored and rotated at random.
+    loss
+        For the paper's network: ``"dot"``, ``"l2"`` or ``"cosine"``.
+    laplacian, laplacian_scale
+        Weight of the Laplacian loss, and its scale: ``"paper"``, so that the weight is the paper's w_lap, or
+        ``"relative"`` to the Laplacian of the target; see :func:`anisomesh.learn.training.losses.laplacian_unit`.
+    gauge
+        Whether the target of the Laplacian loss is first ``"aligned"`` to the prediction, or used ``"raw"`` as in the
+        paper.
+    augment, symmetries
+        Whether items of the paper's network are mirrored and rotated by quarter turns, and whether an epoch has each
+        item in ``"one"`` of the ten ways, at random, or in ``"all"``, as in the paper, with ten times the steps.
     """
 
     data: str
@@ -56,6 +72,7 @@ class TrainingOptions:
     weight_decay: float = 1e-2
     clip: float = 1.0
     warmup: int = 100
+    schedule: str = "cosine"
     noise: float = 0.5
     noise_share: float = 0.5
     seed: int = 0
@@ -64,14 +81,16 @@ class TrainingOptions:
     network: NetworkOptions | PaperOptions = field(default_factory=NetworkOptions)
     loss: str = "dot"
     laplacian: float = 0.1
+    laplacian_scale: str = "paper"
     gauge: str = "aligned"
     augment: bool = True
+    symmetries: str = "one"
 
     def __post_init__(self) -> None:
         for name, low in (("epochs", 1), ("batch", 1), ("warmup", 0), ("seed", 0)):
             if getattr(self, name) < low:
                 raise OptionError(f"{name} = {getattr(self, name)}; expected at least {low}")
-        for name, known in (("loss", LOSSES), ("gauge", ("aligned", "raw"))):
+        for name, known in _CHOICES.items():
             if getattr(self, name) not in known:
                 raise OptionError(f"{name} = {getattr(self, name)!r}; expected one of {', '.join(known)}")
         for name in ("rate", "clip", "minutes"):

@@ -2,16 +2,16 @@
 
 from __future__ import annotations
 
-from typing import Literal
-
 import torch
 from torch import Tensor
 
 _LINE_SOFTENING = 0.05  # of the log squared stretch: the loss is quadratic below and linear above it (heuristic)
 _OFFSET_SOFTENING = 0.02  # mean edge lengths: the loss is quadratic below and linear above it (heuristic)
 
-LossName = Literal["dot", "l2", "cosine"]
-LOSSES: tuple[LossName, ...] = ("dot", "l2", "cosine")
+_POINT_COORDINATES = 3  # of the embedding; the network finds the others
+
+LOSSES, LAPLACIAN_SCALES = ("dot", "l2", "cosine"), ("paper", "relative")
+"""Losses of embeddings, and the scales of the Laplacian loss that is added to them."""
 
 
 def corner_dots(embedded: Tensor, faces: Tensor) -> Tensor:
@@ -27,10 +27,13 @@ def dot_loss(embedded: Tensor, target: Tensor, faces: Tensor) -> Tensor:
     It compares lengths and angles and is invariant to rigid motions of the embedding: equation 5 of the paper, which
     does not scale it. Points (V, d), target (V, d), faces (F, 3).
     """
-    dots = corner_dots(target, faces)
+    scale = _mean_squared_edge(target, faces)
+    return (((corner_dots(embedded, faces) - corner_dots(target, faces)) / scale) ** 2).mean()
+
+
+def _mean_squared_edge(target: Tensor, faces: Tensor) -> Tensor:
     sides = target[faces] - target[faces].roll(-1, dims=1)
-    scale = (sides**2).sum(dim=2).mean().clamp(min=1e-30)
-    return (((corner_dots(embedded, faces) - dots) / scale) ** 2).mean()
+    return (sides**2).sum(dim=2).mean().clamp(min=1e-30)
 
 
 def l2_loss(extra: Tensor, target: Tensor) -> Tensor:
@@ -44,7 +47,7 @@ def cosine_loss(extra: Tensor, target: Tensor) -> Tensor:
 
 
 def laplacian_loss(extra: Tensor, target: Tensor, edges: Tensor, *, aligned: bool = True) -> Tensor:
-    """Return the mean squared error of the Laplacians of coordinates (V, k), over the mean square of the target's.
+    """Return the mean squared error of the Laplacians of coordinates (V, k), in squared lengths.
 
     Parameters
     ----------
@@ -58,14 +61,50 @@ def laplacian_loss(extra: Tensor, target: Tensor, edges: Tensor, *, aligned: boo
 
     Notes
     -----
-    The Laplacian is uniform: the mean of the neighbours minus the point.
+    The Laplacian is uniform: the mean of the neighbours minus the point. The mean is over the points and the 3 + k
+    coordinates of the whole embedding, as in the authors' code. The first three have no error: they are the points.
     """
     if aligned:
         with torch.no_grad():
             u, _, v = torch.linalg.svd((target - target.mean(dim=0)).T @ (extra - extra.mean(dim=0)))
             target = target @ (u @ v)
     difference = _laplacian(extra, edges) - _laplacian(target, edges)
-    return (difference**2).mean() / (_laplacian(target, edges) ** 2).mean().clamp(min=1e-30)
+    return _mean_of_embedding(difference**2)
+
+
+def laplacian_unit(name: str, scale: str, extra: Tensor, whole: Tensor, faces: Tensor, edges: Tensor) -> Tensor:
+    """Return what :func:`laplacian_loss` is divided by before it is weighted and added to the loss of a name.
+
+    Parameters
+    ----------
+    name
+        The loss that it is added to.
+    scale
+        ``"paper"`` divides it by what turns the paper's unscaled loss of this name into the one here, so that the sum
+        is the paper's L + w L_lap times a factor that depends on the target only. ``"relative"`` divides it by its
+        value for coordinates that are all 0.
+    extra, whole
+        Target coordinates beyond the first three (V, k), and all of them (V, 3 + k).
+    faces, edges
+        Faces (F, 3) and edges (E, 2) of the mesh.
+
+    Notes
+    -----
+    With lengths l, dot products are of order l^2, so the dot loss is of order l^4 and the Laplacian loss of order l^2:
+    a weight has a meaning only at one size of the meshes. The authors' are, as here, at bounding-box diagonal 1.
+    """
+    if scale == "relative":
+        unit = _mean_of_embedding(_laplacian(extra, edges) ** 2)
+    elif name == "dot":
+        unit = _mean_squared_edge(whole, faces) ** 2
+    else:
+        unit = _mean_of_embedding(extra**2) if name == "l2" else torch.ones((), dtype=extra.dtype)
+    return unit.clamp(min=1e-30)
+
+
+def _mean_of_embedding(values: Tensor) -> Tensor:
+    """Return the mean of values (V, k) and of three columns of zeros."""
+    return values.sum() / (len(values) * (_POINT_COORDINATES + values.shape[1]))
 
 
 def _laplacian(values: Tensor, edges: Tensor) -> Tensor:

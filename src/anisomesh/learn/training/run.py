@@ -30,6 +30,9 @@ METRICS, EVENTS = "metrics.jsonl", "events"
 VALIDATION_NOISE = (0.0, 0.3)
 """Standard deviations of noise in the validation, in mean edge lengths."""
 
+HALVING_PERIODS = 6
+"""Parts of a run with a constant learning rate: the paper halves it each 100 of 600 epochs."""
+
 _PATH_OPTIONS = ("data", "out", "start")  # may differ between machines
 _FREE_OPTIONS = (*_PATH_OPTIONS, "device", "minutes")  # may differ when a run is resumed
 
@@ -87,7 +90,8 @@ class TrainingRun:
         self.network, self.optimiser, self.process = network, optimiser, process
         self.at = _Position()
         self._events = EventLog(self.out / EVENTS)
-        self._steps = max(1, math.ceil(len(files.training) / options.batch))
+        self._n_examples = len(files.training) * task.copies
+        self._steps = max(1, math.ceil(self._n_examples / options.batch))
 
     def epoch(self, interruption: Interruption) -> EpochRow:
         """Train to the end of the epoch, validate, save, and return the row of the epoch.
@@ -101,7 +105,7 @@ class TrainingRun:
         """
         options, start = self.options, time.monotonic()
         saved = start
-        order = np.random.default_rng([options.seed, self.at.epoch]).permutation(len(self.files.training))
+        order = np.random.default_rng([options.seed, self.at.epoch]).permutation(self._n_examples)
         while self.at.step < self._steps:
             chosen = order[self.at.step * options.batch : (self.at.step + 1) * options.batch]
             self.at.total += self._step(chosen)
@@ -115,7 +119,7 @@ class TrainingRun:
         row: EpochRow = {
             "epoch": self.at.epoch + 1,
             "loss": self.at.total / self._steps,
-            "rate": self._rate(self.at.epoch * self._steps + self._steps),
+            "rate": self.rate(self.at.epoch * self._steps + self._steps),
         }
         self.save()  # before the validation, which may take long
         self.at.epoch, self.at.step, self.at.total = self.at.epoch + 1, 0, 0.0
@@ -159,6 +163,16 @@ class TrainingRun:
         lines = path.read_text(encoding="utf-8").splitlines() if path.exists() else []
         return [row for row in map(json.loads, lines) if row["epoch"] <= self.at.epoch]
 
+    def rate(self, step: int) -> float:
+        """Return the learning rate at a step, counted from the start of the run: linear warm-up times the schedule."""
+        total = max(self.options.epochs * self._steps, 1)
+        rise = min(1.0, (step + 1) / max(self.options.warmup, 1))
+        if self.options.schedule == "halving":
+            fall = 0.5 ** min(HALVING_PERIODS * step // total, HALVING_PERIODS - 1)
+        else:
+            fall = 0.5 * (1.0 + math.cos(math.pi * min(step / total, 1.0)))
+        return self.options.rate * rise * fall
+
     def save(self) -> None:
         """Write the checkpoint, in the first process."""
         if not self.process.is_first:
@@ -199,16 +213,21 @@ class TrainingRun:
         self.save()
         self._events.add(row)
 
+    def _example(self, number: int) -> Any:
+        """Return an example of this epoch, by its number among all items and copies of them."""
+        options = self.options
+        rng = np.random.default_rng([options.seed, self.at.epoch, number])
+        noise = options.noise * rng.random() if rng.random() < options.noise_share else 0.0
+        item, copy = divmod(number, self.task.copies)
+        return self.task.example(load_item(self.files.training[item]), noise, rng, training=True, copy=copy)
+
     def _step(self, chosen: np.ndarray[Any, Any]) -> float:
         """Take one optimisation step on the items with these numbers and return their mean loss."""
         options = self.options
         self.optimiser.zero_grad()
         total = 0.0
-        for number in chosen.tolist()[self.process.rank :: self.process.size]:
-            rng = np.random.default_rng([options.seed, self.at.epoch, number])
-            noise = options.noise * rng.random() if rng.random() < options.noise_share else 0.0
-            example = self.task.example(load_item(self.files.training[number]), noise, rng, training=True)
-            losses = self.task.losses(self.network, example)
+        examples = map(self._example, chosen.tolist()[self.process.rank :: self.process.size])
+        for losses in self.task.training_losses(self.network, examples):
             loss = torch.stack(list(losses.values())).sum() / len(chosen)
             loss.backward()  # type: ignore[no-untyped-call]
             total += float(loss.detach())
@@ -219,15 +238,9 @@ class TrainingRun:
         self.process.sum_gradients(self.network.parameters())
         torch.nn.utils.clip_grad_norm_(self.network.parameters(), options.clip)
         for group in self.optimiser.param_groups:
-            group["lr"] = self._rate(self.at.epoch * self._steps + self.at.step)
+            group["lr"] = self.rate(self.at.epoch * self._steps + self.at.step)
         self.optimiser.step()
         return mean
-
-    def _rate(self, step: int) -> float:
-        """Return the learning rate at a step, counted from the start of the run: linear warm-up times a cosine."""
-        total = max(self.options.epochs * self._steps, 1)
-        rise = min(1.0, (step + 1) / max(self.options.warmup, 1))
-        return self.options.rate * rise * 0.5 * (1.0 + math.cos(math.pi * min(step / total, 1.0)))
 
     def _item_names(self) -> list[list[str]]:
         return [[path.name for path in paths] for paths in (self.files.training, self.files.validation)]

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
 from typing import Any, Protocol
 
@@ -12,12 +13,23 @@ from torch import Tensor, nn
 from anisomesh.learn.architecture import NetworkOptions, PaperOptions
 from anisomesh.learn.data.examples import StretchExample, stretch_example
 from anisomesh.learn.data.items import Item
-from anisomesh.learn.models.paper import PaperInput, PaperNetwork, paper_input
+from anisomesh.learn.models.paper import PaperInput, PaperNetwork, joined, paper_input
 from anisomesh.learn.models.stretch import Prediction, StretchNetwork
 from anisomesh.learn.training.config import TrainingOptions
-from anisomesh.learn.training.losses import cosine_loss, dot_loss, l2_loss, laplacian_loss, line_loss, offset_loss
+from anisomesh.learn.training.losses import (
+    cosine_loss,
+    dot_loss,
+    l2_loss,
+    laplacian_loss,
+    laplacian_unit,
+    line_loss,
+    offset_loss,
+)
 from anisomesh.mesh.noise import NOISES, with_noise
 from anisomesh.mesh.surface import Surface
+
+N_SYMMETRIES = 10
+"""Number of symmetries of the paper's augmentation."""
 
 _OFFSET_WEIGHT = 2.0  # heuristic: weight of the loss of offsets; the loss of line fields has weight 1
 _QUARTER_TURN = np.array([[0.0, -1.0, 0.0], [1.0, 0.0, 0.0], [0.0, 0.0, 1.0]])  # about the z axis
@@ -27,18 +39,30 @@ Losses = dict[str, Tensor]
 
 
 class Task(Protocol):
-    """The examples and losses that a kind of network is trained with."""
+    """The examples and losses that a kind of network is trained with.
+
+    Attributes
+    ----------
+    copies
+        Number of examples of each item in an epoch.
+    """
+
+    copies: int
 
     def network(self) -> nn.Module:
         """Return a network with random weights."""
         ...
 
-    def example(self, item: Item, noise: float, rng: np.random.Generator, *, training: bool) -> Any:
-        """Return input and targets for an item with noise on the input, in mean edge lengths."""
+    def example(self, item: Item, noise: float, rng: np.random.Generator, *, training: bool, copy: int = 0) -> Any:
+        """Return input and targets for a copy of an item with noise on the input, in mean edge lengths."""
         ...
 
     def losses(self, network: nn.Module, example: Any) -> Losses:
         """Return the losses of a network on an example; training minimises their sum."""
+        ...
+
+    def training_losses(self, network: nn.Module, examples: Iterable[Any]) -> Iterator[Losses]:
+        """Yield losses of a network on the examples of a batch; their sums are over the examples of the batch."""
         ...
 
     def baseline_losses(self, example: Any) -> Losses:
@@ -54,6 +78,8 @@ def task_of(options: TrainingOptions) -> Task:
 class StretchTask:
     """Line field and offsets of the default network, which needs no augmentation by rotations as it is equivariant."""
 
+    copies = 1
+
     def __init__(self, options: TrainingOptions) -> None:
         assert isinstance(options.network, NetworkOptions)
         self._network = options.network
@@ -62,7 +88,9 @@ class StretchTask:
         """See :class:`Task`."""
         return StretchNetwork(self._network)
 
-    def example(self, item: Item, noise: float, rng: np.random.Generator, *, training: bool) -> StretchExample:
+    def example(
+        self, item: Item, noise: float, rng: np.random.Generator, *, training: bool, copy: int = 0
+    ) -> StretchExample:
         """See :class:`Task`. Training has noise of all kinds, validation independent noise."""
         kind = NOISES[int(rng.integers(len(NOISES)))] if training else NOISES[0]
         return stretch_example(item, self._network.scales, noise, rng, kind)
@@ -70,6 +98,10 @@ class StretchTask:
     def losses(self, network: nn.Module, example: StretchExample) -> Losses:
         """See :class:`Task`."""
         return self._losses(Prediction(*(values.cpu() for values in network(example.hierarchy))), example)
+
+    def training_losses(self, network: nn.Module, examples: Iterable[StretchExample]) -> Iterator[Losses]:
+        """See :class:`Task`."""
+        return (self.losses(network, example) for example in examples)
 
     def baseline_losses(self, example: StretchExample) -> Losses:
         """See :class:`Task`."""
@@ -103,20 +135,23 @@ class EmbeddingTask:
     def __init__(self, options: TrainingOptions) -> None:
         assert isinstance(options.network, PaperOptions)
         self._options, self._network = options, options.network
+        self.copies = N_SYMMETRIES if options.augment and options.symmetries == "all" else 1
 
     def network(self) -> PaperNetwork:
         """See :class:`Task`."""
         return PaperNetwork(self._network)
 
-    def example(self, item: Item, noise: float, rng: np.random.Generator, *, training: bool) -> EmbeddingExample:
+    def example(
+        self, item: Item, noise: float, rng: np.random.Generator, *, training: bool, copy: int = 0
+    ) -> EmbeddingExample:
         """See :class:`Task`. The first three extra coordinates start from the normals, so they rotate with the mesh."""
         clean, extra = item.surface, item.extra
         if training and self._options.augment:
-            symmetry = random_symmetry(rng)
-            clean = clean.with_points(clean.points @ symmetry.T)
-            if np.linalg.det(symmetry) < 0.0:
+            turn = symmetry(copy if self.copies > 1 else int(rng.integers(N_SYMMETRIES)))
+            clean = clean.with_points(clean.points @ turn.T)
+            if np.linalg.det(turn) < 0.0:
                 clean = Surface(clean.points, clean.faces[:, ::-1])
-            extra = np.concatenate([extra[:, :3] @ symmetry.T, extra[:, 3:]], axis=1)
+            extra = np.concatenate([extra[:, :3] @ turn.T, extra[:, 3:]], axis=1)
         noisy = with_noise(clean, noise, rng)
         return EmbeddingExample(
             inputs=paper_input(noisy),
@@ -128,28 +163,40 @@ class EmbeddingTask:
 
     def losses(self, network: nn.Module, example: EmbeddingExample) -> Losses:
         """See :class:`Task`."""
-        return {"embedding": self._loss(network(example.inputs).cpu(), example)}
+        return self._losses(network(example.inputs).cpu(), example)
+
+    def training_losses(self, network: nn.Module, examples: Iterable[EmbeddingExample]) -> Iterator[Losses]:
+        """See :class:`Task`. Batch norms need all examples of the batch at once."""
+        if self._network.norm == "mesh":
+            yield from (self.losses(network, example) for example in examples)
+            return
+        batch = list(examples)
+        if not batch:  # more processes than examples
+            return
+        found = network(joined([example.inputs for example in batch])).cpu().split([len(one.extra) for one in batch])
+        losses = [self._losses(extra, example) for extra, example in zip(found, batch, strict=True)]
+        yield {name: torch.stack([one[name] for one in losses]).sum() for name in losses[0]}
 
     def baseline_losses(self, example: EmbeddingExample) -> Losses:
         """See :class:`Task`."""
-        return {"embedding": self._loss(torch.zeros_like(example.extra), example)}
+        return self._losses(torch.zeros_like(example.extra), example)
 
-    def _loss(self, extra: Tensor, example: EmbeddingExample) -> Tensor:
-        options = self._options
+    def _losses(self, extra: Tensor, example: EmbeddingExample) -> Losses:
+        options, faces, edges = self._options, example.faces, example.edges
+        whole, target = (torch.cat([example.points, values], dim=1) for values in (extra, example.extra))
         if options.loss == "dot":
-            whole, target = (torch.cat([example.points, values], dim=1) for values in (extra, example.extra))
-            loss = dot_loss(whole, target, example.faces)
+            losses = {"dot": dot_loss(whole, target, faces)}
         else:
-            loss = (l2_loss if options.loss == "l2" else cosine_loss)(extra, example.extra)
+            losses = {options.loss: (l2_loss if options.loss == "l2" else cosine_loss)(extra, example.extra)}
         if options.laplacian > 0.0:
-            aligned = options.gauge == "aligned"
-            loss = loss + options.laplacian * laplacian_loss(extra, example.extra, example.edges, aligned=aligned)
-        return loss
+            loss = laplacian_loss(extra, example.extra, edges, aligned=options.gauge == "aligned")
+            unit = laplacian_unit(options.loss, options.laplacian_scale, example.extra, target, faces, edges)
+            losses["laplacian"] = options.laplacian * loss / unit
+        return losses
 
 
-def random_symmetry(rng: np.random.Generator) -> np.ndarray[Any, np.dtype[np.float64]]:
-    """Return one of the ten symmetries of the paper's augmentation (3, 3): identity, mirrors and quarter turns."""
-    number = int(rng.integers(10))
+def symmetry(number: int) -> np.ndarray[Any, np.dtype[np.float64]]:
+    """Return one of the symmetries of the paper's augmentation (3, 3): three mirrors, six quarter turns, identity."""
     axis = number % 3
     if number < 3:
         return np.diag(np.where(np.arange(3) == axis, -1.0, 1.0))
