@@ -8,6 +8,7 @@ from typing import Any
 import numpy.typing as npt
 
 from anisomesh.caveats import caveats, losses_of_repair, losses_of_shape
+from anisomesh.counts.search import smallest_within
 from anisomesh.cvt.lbfgs import Optimised
 from anisomesh.cvt.schedule import DualFeedback, optimise_sites
 from anisomesh.deadline import Deadline
@@ -30,7 +31,6 @@ from anisomesh.resolve import (
 )
 from anisomesh.result import RemeshResult
 from anisomesh.run import OPTIMISATION_SHARE, Run
-from anisomesh.search import smallest_within
 from anisomesh.tasks import set_up
 from anisomesh.voronoi.restricted import RestrictedVoronoi
 

@@ -10,13 +10,13 @@ import trimesh
 from edge_distance import distance_to_edges
 
 import anisomesh
+from anisomesh.counts.search import smallest_within
 from anisomesh.deadline import Deadline
 from anisomesh.errors import AnisomeshError, OptionError, TimeLimitError
 from anisomesh.features.detect import points_along
 from anisomesh.mesh import topology
 from anisomesh.mesh.distance import hausdorff_distance, surface_distance
 from anisomesh.mesh.surface import Surface
-from anisomesh.search import smallest_within
 from anisomesh.shapes.analytic import cad_features, cad_part, cylinder, ellipsoid, open_patch, sphere, torus
 
 COUNTS = {
