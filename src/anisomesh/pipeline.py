@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
+from functools import partial
 from typing import Any
 
 import numpy.typing as npt
@@ -188,8 +189,8 @@ def _mesh_of_start(task: MeshingTask, target: FitTarget | None, options: RemeshO
             task.voronoi,
             task.n_vertices,
             task.features,
-            cvt_options(options),
-            feedback=DualFeedback(dual_squared_errors, missing_on_creases),
+            cvt_options(options, sized=task.error_weights is not None),
+            feedback=DualFeedback(partial(dual_squared_errors, weights=task.error_weights), missing_on_creases),
             on_step=run.on_step,
             deadline=run.deadline.share(OPTIMISATION_SHARE),
         )

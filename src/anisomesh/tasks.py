@@ -6,9 +6,10 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from anisomesh._arrays import EdgeMask, PointMask
+from anisomesh._arrays import CornerTensors, EdgeMask, PointMask, PointScalars, PointTensors
 from anisomesh.delaunay.meshing import MeshingTask
 from anisomesh.embedding.base import Embedding
+from anisomesh.embedding.density import area_factors, density_of_sizes
 from anisomesh.embedding.embedder import checked_embedding
 from anisomesh.features.detect import WEAK_ANGLE, apexes, sharp_edges
 from anisomesh.features.network import FeatureNetwork, trace_features
@@ -26,7 +27,14 @@ from anisomesh.metric.narrow_patches import limit_to_patches
 from anisomesh.metric.thin_walls import separate_thin_walls
 from anisomesh.metric.transfer import PlacedMetric
 from anisomesh.options import RemeshOptions
-from anisomesh.resolve import embedder, fit_plan, follows_creases, metric_source, with_embedding_chosen
+from anisomesh.resolve import (
+    embedder,
+    fit_plan,
+    follows_creases,
+    metric_source,
+    prescribes_sizes,
+    with_embedding_chosen,
+)
 from anisomesh.run import Run
 from anisomesh.voronoi.restricted import RestrictedVoronoi
 
@@ -88,6 +96,10 @@ def set_up(source: PreparedInput, n: int, options: RemeshOptions, run: Run, *, n
         apart = separate_thin_walls(field, working, n, options.feature_angle) if follows_creases(options) else field
         embedding = checked_embedding(embedder(options)(working, apart), working)
         density = None if source.density is None else split.interpolate(source.density)
+        weights = None
+        if prescribes_sizes(options) and not nearest:
+            density = _sized_density(working, apart, embedding, density)
+            weights = area_factors(working, _given(field)) ** 2
         embedded = EmbeddedSurface(working, embedding.points, embedding.scale, density)
         task = MeshingTask(
             voronoi=RestrictedVoronoi(embedded, threads=options.threads),
@@ -96,6 +108,7 @@ def set_up(source: PreparedInput, n: int, options: RemeshOptions, run: Run, *, n
             tensors=field.tensors,
             n_vertices=n,
             deadline=run.deadline,
+            error_weights=weights,
         )
         plan = fit_plan(options, surface, nearest=nearest)
         target = None if plan is None else _fit_target(task, working, field, plan, options.feature_angle)
@@ -108,6 +121,19 @@ def set_up(source: PreparedInput, n: int, options: RemeshOptions, run: Run, *, n
         dual=task,
         fit=target,
     )
+
+
+def _sized_density(
+    surface: Surface, field: MetricField, embedding: Embedding, density: PointScalars | None
+) -> PointScalars:
+    """Return the density (V,) that a user gives, 1 by default, times what the embedding leaves of the sizes."""
+    left = density_of_sizes(surface, _given(field), embedding.points)
+    return left if density is None else density * left
+
+
+def _given(field: MetricField) -> PointTensors | CornerTensors:
+    """Return the tensors of a field at corners, if it has these, or else at points."""
+    return field.tensors if field.corner_tensors is None else field.corner_tensors
 
 
 def _fit_target(

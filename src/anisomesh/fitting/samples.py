@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 import numpy.typing as npt
@@ -38,6 +38,17 @@ class SurfaceSamples:
     normals: Floats
     weights: Floats
     roots: PointTensors
+
+    def relative(self) -> SurfaceSamples:
+        """Return the samples with weights times the square of the area factor of the metric, their sum the same.
+
+        The factor is the area in the metric over the area, det Q |Q^-1 n| for the normal n.
+        """
+        factors = np.linalg.det(self.roots) * np.linalg.norm(
+            np.linalg.solve(self.roots, self.normals[:, :, None])[:, :, 0], axis=1
+        )
+        weights = self.weights * (factors / factors.mean()) ** 2
+        return replace(self, weights=weights * (self.weights.sum() / weights.sum()))
 
     @property
     def count(self) -> int:
