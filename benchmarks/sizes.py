@@ -4,8 +4,8 @@ Usage: python benchmarks/sizes.py [--factor 10] [--vertices 1500] [--shapes flat
 
 The size is h = factor^t, with t from 0 at one end of the shape to 1 at the other, and the metric I / h^2. The length of
 an edge is the integral of 1 / h along it. Columns: mean length of the edges with a midpoint in each fifth of the range
-of t, over the median of all edges; share of edges between 1 / sqrt(2) and sqrt(2) medians; for edges of the embedded input
-length in the embedding over length in the metric, in each fifth, over the same in the fifth in the middle; vertices;
+of t, over the median of all edges; share of edges between 1 / sqrt(2) and sqrt(2) medians; for edges of the input the
+length in the embedding over the one in the metric, in each fifth, over the same in the fifth in the middle; vertices;
 inverted and intersecting triangles; seconds.
 """
 

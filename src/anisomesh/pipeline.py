@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy.typing as npt
 
-from anisomesh.caveats import caveats, losses_of_repair, losses_of_shape
+from anisomesh.caveats import caveats, losses_of_repair, losses_of_shape, unfollowed_sizes
 from anisomesh.counts.search import smallest_within
 from anisomesh.cvt.lbfgs import Optimised
 from anisomesh.cvt.schedule import DualFeedback, optimise_sites
@@ -20,10 +20,10 @@ from anisomesh.errors import OptionError
 from anisomesh.features.tagged import distance_to_crease_edges
 from anisomesh.fitting.target import FitTarget
 from anisomesh.fitting.valid import fit_without_faults
-from anisomesh.inputs import PreparedInput, prepared_input
 from anisomesh.io.convert import as_surface
 from anisomesh.mesh.surface import Surface
 from anisomesh.mesh.validity import Validity, check_validity
+from anisomesh.metric.conformity import Conformity, MetricExtent, conformity
 from anisomesh.options import MIN_VERTICES, RemeshOptions, read_target, with_overrides
 from anisomesh.progress import OnStep, StepInfo, ignore_steps
 from anisomesh.resolve import (
@@ -32,7 +32,9 @@ from anisomesh.resolve import (
 )
 from anisomesh.result import RemeshResult
 from anisomesh.run import OPTIMISATION_SHARE, Run
-from anisomesh.tasks import set_up
+from anisomesh.setup.inputs import PreparedInput, prepared_input
+from anisomesh.setup.measured import count_for_length, unit_of_lengths
+from anisomesh.setup.tasks import Tasks, set_up
 from anisomesh.voronoi.restricted import RestrictedVoronoi
 
 MAX_STARTS = 3  # of the optimisation, with one seed after the other, for a mesh without faults
@@ -59,7 +61,8 @@ def remesh(
     faces
         Triangles (F, 3), if the first argument is an array of points.
     n_vertices
-        Vertices of the result, at least 4.
+        Vertices of the result, at least 4. Without this, ``ratio`` and ``max_error`` the option ``edge_length`` or
+        ``size_field`` says how many.
     ratio
         Instead of ``n_vertices``: vertices as a share of those of the prepared input.
     max_error
@@ -96,7 +99,7 @@ def remesh(
         raise OptionError(f"on_step = {on_step!r}; expected a function of a StepInfo")
     run = Run(on_step or ignore_steps, deadline)
     surface = as_surface(mesh, faces)
-    n_vertices, ratio, max_error = read_target(n_vertices, ratio, max_error)
+    n_vertices, ratio, max_error = read_target(n_vertices, ratio, max_error, options)
     with run.stage("prepare"):
         source = prepared_input(surface, options)
     prepared = source.prepared.surface
@@ -108,24 +111,41 @@ def remesh(
             return _remesh(source, n, options, run, nearest=True)
 
         return smallest_within(with_vertices, prepared, max_error, deadline)
-    n = n_vertices or max(MIN_VERTICES, round((ratio or 0.0) * prepared.n_points))
-    return _remesh(source, n, options, run)
+    if ratio is not None:
+        n_vertices = max(MIN_VERTICES, round(ratio * prepared.n_points))
+    if n_vertices is None:
+        return _remesh(source, count_for_length(source, options, run), options, run, asked=options.absolute_length)
+    return _remesh(source, n_vertices, options, run)
 
 
-def _remesh(source: PreparedInput, n: int, options: RemeshOptions, run: Run, *, nearest: bool = False) -> RemeshResult:
-    """Remesh a prepared surface with n vertices; ``nearest`` if the distance counts more than the shape."""
+def _remesh(
+    source: PreparedInput,
+    n: int,
+    options: RemeshOptions,
+    run: Run,
+    *,
+    nearest: bool = False,
+    asked: float | None = None,
+) -> RemeshResult:
+    """Remesh a prepared surface with n vertices.
+
+    ``nearest`` if the distance counts more than the shape, and ``asked`` is the length of edges in the metric if that
+    was asked for.
+    """
     prepared, tasks = source.prepared, set_up(source, n, options, run, nearest=nearest)
-    frame, task, field = tasks.frame, tasks.dual, tasks.field
+    frame, task, field = tasks.frame, tasks.dual, tasks.metric.field
     run.check_time()
+    order = task.voronoi.embedded.face_order
     made = _valid_mesh(task, tasks.fit, tasks.options, run)
     mesh, optimised, validity = made.mesh, made.optimised, made.validity
+    agreement = _agreement(mesh, tasks, asked) if asked or task.error_weights is not None else None
     return RemeshResult(
         surface=Surface(frame.to_model(mesh.points), mesh.faces),
         prepared=prepared.surface,
         prepare_report=prepared.report,
         working=task.voronoi.embedded.surface,
         tensors=field.tensors,
-        corner_tensors=field.corner_tensors,
+        corner_tensors=None if field.corner_tensors is None else field.corner_tensors[order],
         embedding_name=embedding_name(tasks.options),
         noise=field.noise,
         frame=frame,
@@ -147,8 +167,21 @@ def _remesh(source: PreparedInput, n: int, options: RemeshOptions, run: Run, *, 
                 tasks.surface, Surface(mesh.points, mesh.faces), task.corner_places, made.feature_distance
             ),
             *caveats(n, field.noise, mesh, validity, optimised, tasks.options),
+            *(() if agreement is None else unfollowed_sizes(agreement)),
         ),
+        conformity=agreement,
         feature_distance=made.feature_distance * frame.scale,
+    )
+
+
+def _agreement(mesh: ValidMesh, tasks: Tasks, asked: float | None) -> Conformity:
+    """Return how well the edges of a mesh have the lengths that the metric asks for."""
+    return conformity(
+        Surface(mesh.points, mesh.faces),
+        tasks.metric,
+        MetricExtent.of(tasks.metric.surface.surface, tasks.metric.field),
+        asked=asked,
+        unit=unit_of_lengths(tasks.options, tasks.frame),
     )
 
 

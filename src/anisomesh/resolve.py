@@ -125,11 +125,14 @@ def follows_creases(options: RemeshOptions) -> bool:
 def prescribes_sizes(options: RemeshOptions) -> bool:
     """Return whether the metric of the user says how large triangles are, which then counts more than the distance.
 
-    So it is with tensors and metric sources that are not built in, unless an own energy has the last word.
+    So it is with sizes, tensors and metric sources that are not built in, unless an own energy has the last word.
     """
     metric = options.metric
-    own = type(metric) not in _NAMES_OF_SOURCES if callable(metric) else not isinstance(metric, str)
-    return own and isinstance(energy(options), NormalMetric)
+    if isinstance(metric, str):
+        sized = options.size_field is not None or (metric == "uniform" and options.edge_length is not None)
+    else:
+        sized = type(metric) not in _NAMES_OF_SOURCES
+    return sized and isinstance(energy(options), NormalMetric)
 
 
 def fit_plan(options: RemeshOptions, surface: Surface, *, nearest: bool = False) -> FitPlan | None:

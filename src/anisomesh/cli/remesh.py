@@ -34,6 +34,14 @@ def command(
             help="Use the fewest vertices within this distance of the input, in model units or % of the diagonal.",
         ),
     ] = None,
+    edge_length: Annotated[
+        str | None,
+        typer.Option(
+            metavar="LENGTH",
+            help="Use as many vertices as edges of this length take, in model units or % of the diagonal; with metric "
+            "curvature along the smaller curvature.",
+        ),
+    ] = None,
     features: Annotated[
         Path | None,
         typer.Option(metavar="FILE", help="Creases to keep: a text file, two vertex numbers per line, from 0."),
@@ -51,8 +59,9 @@ def command(
     **options: Any,
 ) -> None:
     """Remesh IN with anisotropic triangles and write the result to OUT."""
-    if (n_vertices, ratio, max_error).count(None) != 2:
-        raise typer.BadParameter("give one of -n (number of vertices), --ratio and --max-error")
+    if (n_vertices, ratio, max_error, edge_length).count(None) != 3:
+        raise typer.BadParameter("give one of -n (number of vertices), --ratio, --max-error and --edge-length")
+    length = None if edge_length is None else Length.parse(edge_length, "--edge-length")
     error = None if max_error is None else Length.parse(max_error, "--max-error")
     outputs = Outputs(mesh=out, report=report, rvd=rvd, picture=picture)
     weights = options.get("weights")
@@ -65,6 +74,7 @@ def command(
             options["features"] = load_pairs(features)
         options |= {"n_vertices": n_vertices, "ratio": ratio}
         options["max_error"] = None if error is None else error.on(surface)
+        options["edge_length"] = None if length is None else length.on(surface)
         result, facts = run_remesh(surface, display, name=str(source), load_seconds=seconds, **options)
         facts["options"]["features"] = None if features is None else str(features)
         outputs.write(result, facts, display)

@@ -9,6 +9,7 @@ import numpy.typing as npt
 
 from anisomesh._arrays import EdgeMask, Points, PointTensors
 from anisomesh.mesh.surface import Surface
+from anisomesh.metric.tensors import area_factors_of_tensors
 from anisomesh.metric.transfer import PlacedMetric
 
 _METRIC_INSET = 1e-3  # of the way from a crease to the barycentre of a face, where the metric is the one of that face
@@ -42,11 +43,9 @@ class SurfaceSamples:
     def relative(self) -> SurfaceSamples:
         """Return the samples with weights times the square of the area factor of the metric, their sum the same.
 
-        The factor is the area in the metric over the area, det Q |Q^-1 n| for the normal n.
+        The factor is the area in the metric over the area.
         """
-        factors = np.linalg.det(self.roots) * np.linalg.norm(
-            np.linalg.solve(self.roots, self.normals[:, :, None])[:, :, 0], axis=1
-        )
+        factors = area_factors_of_tensors(self.roots @ self.roots, self.normals)
         weights = self.weights * (factors / factors.mean()) ** 2
         return replace(self, weights=weights * (self.weights.sum() / weights.sum()))
 

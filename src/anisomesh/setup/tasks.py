@@ -11,19 +11,15 @@ from anisomesh.delaunay.meshing import MeshingTask
 from anisomesh.embedding.base import Embedding
 from anisomesh.embedding.density import area_factors, density_of_sizes
 from anisomesh.embedding.embedder import checked_embedding
-from anisomesh.features.detect import WEAK_ANGLE, apexes, sharp_edges
+from anisomesh.features.detect import sharp_edges
 from anisomesh.features.network import FeatureNetwork, trace_features
 from anisomesh.fitting.fit import FitPlan
 from anisomesh.fitting.target import FitTarget
-from anisomesh.inputs import PreparedInput
-from anisomesh.memory import check_memory
 from anisomesh.mesh.closest_points import ClosestPoints
 from anisomesh.mesh.embedded_surface import EmbeddedSurface
-from anisomesh.mesh.geometry import Frame, unit_frame
+from anisomesh.mesh.geometry import Frame
 from anisomesh.mesh.surface import Surface
-from anisomesh.mesh.working_surface import working_surface
-from anisomesh.metric.field import MetricField, checked_field
-from anisomesh.metric.narrow_patches import limit_to_patches
+from anisomesh.metric.field import MetricField
 from anisomesh.metric.thin_walls import separate_thin_walls
 from anisomesh.metric.transfer import PlacedMetric
 from anisomesh.options import RemeshOptions
@@ -31,11 +27,11 @@ from anisomesh.resolve import (
     embedder,
     fit_plan,
     follows_creases,
-    metric_source,
     prescribes_sizes,
-    with_embedding_chosen,
 )
 from anisomesh.run import Run
+from anisomesh.setup.inputs import PreparedInput
+from anisomesh.setup.measured import measure
 from anisomesh.voronoi.restricted import RestrictedVoronoi
 
 
@@ -51,10 +47,10 @@ class Tasks:
         From model units to bounding-box diagonal 1.
     surface
         The surface that the mesh is to approximate, at bounding-box diagonal 1.
-    field
-        The metric on the embedded surface.
+    metric
+        The metric, on the surface that was embedded.
     embedding
-        The embedding of that.
+        The embedding of that surface.
     dual
         The task to make a mesh from sites.
     fit
@@ -64,7 +60,7 @@ class Tasks:
     options: RemeshOptions
     frame: Frame
     surface: Surface
-    field: MetricField
+    metric: PlacedMetric
     embedding: Embedding
     dual: MeshingTask
     fit: FitTarget | None
@@ -75,23 +71,9 @@ def set_up(source: PreparedInput, n: int, options: RemeshOptions, run: Run, *, n
 
     ``nearest`` if the distance counts more than the shape.
     """
-    prepared = source.prepared
-    with run.stage("prepare"):
-        frame = unit_frame(prepared.surface.points)
-        surface = prepared.surface.with_points(frame.to_unit(prepared.surface.points))
-        options = with_embedding_chosen(options, surface)
-        creases = sharp_edges(surface, min(options.feature_angle, WEAK_ANGLE))
-        split = working_surface(surface, n, creases=creases, tagged=source.tagged)
-        tips = apexes(split.coarse, sharp_edges(split.coarse, options.feature_angle))
-        check_memory(n, split.surface.n_faces)
-    with run.stage("metric"):
-        tensors = None if source.tensors is None else split.interpolate(source.tensors * frame.scale**2)
-        field = checked_field(metric_source(options, surface, tensors)(split.surface), split.surface)
-        working = split.surface
-        if field.points is not None:
-            working = working.with_points(field.points)
-            surface = split.coarse.with_points(field.points[: split.coarse.n_points])
-        field = limit_to_patches(field, working, n)
+    measured = measure(source, n, options, run)
+    options, surface, split = measured.options, measured.surface, measured.split
+    working, field = measured.working, measured.field
     with run.stage("embed"):
         apart = separate_thin_walls(field, working, n, options.feature_angle) if follows_creases(options) else field
         embedding = checked_embedding(embedder(options)(working, apart), working)
@@ -103,7 +85,7 @@ def set_up(source: PreparedInput, n: int, options: RemeshOptions, run: Run, *, n
         embedded = EmbeddedSurface(working, embedding.points, embedding.scale, density)
         task = MeshingTask(
             voronoi=RestrictedVoronoi(embedded, threads=options.threads),
-            features=_features(embedded, n, split.tagged, tips, options),
+            features=_features(embedded, n, split.tagged, measured.tips, options),
             surface=surface,
             tensors=field.tensors,
             n_vertices=n,
@@ -111,12 +93,13 @@ def set_up(source: PreparedInput, n: int, options: RemeshOptions, run: Run, *, n
             error_weights=weights,
         )
         plan = fit_plan(options, surface, nearest=nearest)
-        target = None if plan is None else _fit_target(task, working, field, plan, options.feature_angle)
+        metric = PlacedMetric(ClosestPoints(working), field)
+        target = None if plan is None else _fit_target(task, metric, plan, options.feature_angle)
     return Tasks(
         options=options,
-        frame=frame,
+        frame=measured.frame,
         surface=surface,
-        field=field,
+        metric=metric,
         embedding=embedding,
         dual=task,
         fit=target,
@@ -136,13 +119,11 @@ def _given(field: MetricField) -> PointTensors | CornerTensors:
     return field.tensors if field.corner_tensors is None else field.corner_tensors
 
 
-def _fit_target(
-    task: MeshingTask, working: Surface, field: MetricField, plan: FitPlan, crease_angle: float
-) -> FitTarget:
-    """Return what meshes are fitted to; the field is on the working surface."""
+def _fit_target(task: MeshingTask, metric: PlacedMetric, plan: FitPlan, crease_angle: float) -> FitTarget:
+    """Return what meshes are fitted to."""
     return FitTarget.of(
         task.reference,
-        PlacedMetric(ClosestPoints(working), field),
+        metric,
         task.n_vertices,
         corners=task.corner_places,
         holds_creases=bool(task.features.required.any()),
