@@ -179,6 +179,10 @@ class RemeshOptions:
             value = getattr(self, name)
             if value is not None and not (math.isfinite(value) and value > 0.0):
                 raise OptionError(f"{name} = {value}; expected a positive finite number")
+        if self.absolute_length is not None and self.density is not None:
+            raise OptionError(
+                "a density and an edge_length or size_field both say how large triangles are; leave one out"
+            )
         metric = self.metric if isinstance(self.metric, str) else type(self.metric).__name__
         if self.size_field is None:
             for name in _SIZES[1:]:

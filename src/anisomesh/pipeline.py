@@ -133,7 +133,7 @@ def _remesh(
     was asked for.
     """
     prepared, tasks = source.prepared, set_up(source, n, options, run, nearest=nearest)
-    frame, task, field = tasks.frame, tasks.dual, tasks.metric.field
+    frame, task, field = tasks.frame, tasks.dual, tasks.field
     run.check_time()
     order = task.voronoi.embedded.face_order
     made = _valid_mesh(task, tasks.fit, tasks.options, run)

@@ -153,6 +153,21 @@ def test_only_ratios_of_sizes_count_with_a_number_of_vertices():
     assert first.conformity.asked is None
 
 
+def test_a_density_changes_the_lengths_asked_for():
+    surface = torus()
+    given = {"metric": tensors_of(np.ones(surface.n_points)), "density": 16.0 ** place(surface.points, surface)}
+    result = anisomesh.remesh(surface, n_vertices=500, **given)
+    middles = result.surface.points[result.surface.edges].mean(axis=1)
+    lengths, at = result.surface.edge_lengths, place(middles, surface)
+    assert lengths[at < 0.1].mean() / lengths[at > 0.9].mean() == pytest.approx(2.0 * 16.0**-0.025, rel=0.1)
+    assert result.conformity.share > 0.9
+
+
+def test_lengths_that_hardly_any_triangle_has_are_said():
+    result = anisomesh.remesh(sphere(2), edge_length=10.0, metric="uniform", max_iterations=5)
+    assert any("do not have the lengths" in warning for warning in result.warnings)
+
+
 @given(seed=st.integers(0, 1000), gradation=st.floats(0.05, 2.0))
 def test_sizes_grow_no_faster_than_the_gradation(seed, gradation):
     surface = torus(n_major=12, n_minor=8)
@@ -195,6 +210,7 @@ def test_sizes_are_kept_within_bounds():
         ({"edge_length": 0.0}, "edge_length = 0.0; expected a positive finite number"),
         ({"edge_length": 0.1, "metric": "approximation"}, "no unit"),
         ({"edge_length": 0.1, "n_vertices": 100}, "give one of"),
+        ({"edge_length": 0.1, "density": np.ones(162)}, "density and an edge_length or size_field"),
     ],
 )
 def test_sizes_that_make_no_sense_are_refused(options, words):

@@ -17,9 +17,9 @@ from anisomesh.metric.transfer import PlacedMetric
 _EQUILATERAL_AREA = 0.25 * np.sqrt(3.0)  # of a triangle with sides 1
 _QUADRATURE = np.polynomial.legendre.leggauss(3)  # along edges
 _QUANTILES = (0.05, 0.25, 0.5, 0.75, 0.95)
-_GROUPS = 10  # of edges, by the size asked for
-_MIN_GROUP = 10  # edges, for a mean length that says something
-_TOLERANCE = 0.25  # by which the mean length in a group may be off
+_MAX_GROUPS = 10  # of edges, by the size asked for
+_MIN_GROUP = 10  # edges, for a mean length that says something, if there are as many
+_MAX_OFF = 0.25  # by which the mean length in a group may be off
 _MAX_COUNT = 2**62  # so that it fits an integer; no memory holds as many vertices
 
 
@@ -150,14 +150,15 @@ def _off(relative: Floats, sizes: Floats, weights: Floats) -> tuple[float, float
     """
     order = np.argsort(sizes, kind="stable")
     sums = np.cumsum(weights[order])
-    group = np.minimum((_GROUPS * sums / sums[-1]).astype(np.int64), _GROUPS - 1)
+    count = min(max(len(order) // _MIN_GROUP, 1), _MAX_GROUPS)
+    group = np.minimum((count * sums / sums[-1]).astype(np.int64), count - 1)
     share, worst = 0.0, 1.0
-    for k in range(_GROUPS):
+    for k in range(count):
         members = order[group == k]
-        if len(members) < _MIN_GROUP:
+        if len(members) < min(_MIN_GROUP, len(order)):
             continue
         mean = float(relative[members].mean())
-        if abs(mean - 1.0) > _TOLERANCE:
+        if abs(mean - 1.0) > _MAX_OFF:
             share += float(weights[members].sum() / sums[-1])
             worst = max(worst, mean, key=lambda factor: abs(np.log(factor)))
     return share, worst

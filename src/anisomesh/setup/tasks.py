@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -47,8 +47,10 @@ class Tasks:
         From model units to bounding-box diagonal 1.
     surface
         The surface that the mesh is to approximate, at bounding-box diagonal 1.
+    field
+        The metric on the embedded surface.
     metric
-        The metric, on the surface that was embedded.
+        The same there with what a density adds, if sizes are prescribed.
     embedding
         The embedding of that surface.
     dual
@@ -60,6 +62,7 @@ class Tasks:
     options: RemeshOptions
     frame: Frame
     surface: Surface
+    field: MetricField
     metric: PlacedMetric
     embedding: Embedding
     dual: MeshingTask
@@ -78,10 +81,10 @@ def set_up(source: PreparedInput, n: int, options: RemeshOptions, run: Run, *, n
         apart = separate_thin_walls(field, working, n, options.feature_angle) if follows_creases(options) else field
         embedding = checked_embedding(embedder(options)(working, apart), working)
         density = None if source.density is None else split.interpolate(source.density)
-        weights = None
+        asked, weights = _with_density(field, density, working), None
         if prescribes_sizes(options) and not nearest:
-            density = _sized_density(working, apart, embedding, density)
-            weights = area_factors(working, _given(field)) ** 2
+            density = density_of_sizes(working, _given(_with_density(apart, density, working)), embedding.points)
+            weights = area_factors(working, _given(asked)) ** 2
         embedded = EmbeddedSurface(working, embedding.points, embedding.scale, density)
         task = MeshingTask(
             voronoi=RestrictedVoronoi(embedded, threads=options.threads),
@@ -93,12 +96,13 @@ def set_up(source: PreparedInput, n: int, options: RemeshOptions, run: Run, *, n
             error_weights=weights,
         )
         plan = fit_plan(options, surface, nearest=nearest)
-        metric = PlacedMetric(ClosestPoints(working), field)
+        metric = PlacedMetric(ClosestPoints(working), field if weights is None else asked)
         target = None if plan is None else _fit_target(task, metric, plan, options.feature_angle)
     return Tasks(
         options=options,
         frame=measured.frame,
         surface=surface,
+        field=field,
         metric=metric,
         embedding=embedding,
         dual=task,
@@ -106,12 +110,14 @@ def set_up(source: PreparedInput, n: int, options: RemeshOptions, run: Run, *, n
     )
 
 
-def _sized_density(
-    surface: Surface, field: MetricField, embedding: Embedding, density: PointScalars | None
-) -> PointScalars:
-    """Return the density (V,) that a user gives, 1 by default, times what the embedding leaves of the sizes."""
-    left = density_of_sizes(surface, _given(field), embedding.points)
-    return left if density is None else density * left
+def _with_density(field: MetricField, density: PointScalars | None, surface: Surface) -> MetricField:
+    """Return a metric field times the root of a density (V,), as the area of triangles is to be divided by it."""
+    if density is None:
+        return field
+    root, corners = np.sqrt(density), field.corner_tensors
+    if corners is not None:
+        corners = root[surface.faces][:, :, None, None] * corners
+    return replace(field, tensors=root[:, None, None] * field.tensors, corner_tensors=corners)
 
 
 def _given(field: MetricField) -> PointTensors | CornerTensors:
