@@ -64,9 +64,10 @@ def losses_of_shape(
 def unfollowed_sizes(agreement: Conformity) -> Iterator[str]:
     """Yield a sentence if edges do not have the lengths that a metric asks for on a considerable part of a mesh."""
     if agreement.off_share >= _OFF_SHARE:
+        smaller = "more vertices" if agreement.asked is None else "smaller sizes"
         yield (
             f"edges do not have the lengths that the metric asks for on {agreement.off_share:.0%} of the mesh, where "
-            f"they are up to {agreement.off_factor:.2f} times as long; ask for more vertices, or sizes that vary less"
+            f"they are up to {agreement.off_factor:.2f} times as long; ask for {smaller}, or sizes that vary less"
         )
 
 

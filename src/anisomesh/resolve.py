@@ -128,8 +128,8 @@ def prescribes_sizes(options: RemeshOptions) -> bool:
     So it is with sizes, tensors and metric sources that are not built in, unless an own energy has the last word.
     """
     metric = options.metric
-    if isinstance(metric, str):
-        sized = options.size_field is not None or (metric == "uniform" and options.edge_length is not None)
+    if isinstance(metric, str | Uniform):
+        sized = options.absolute_length is not None and metric in ("uniform", Uniform())
     else:
         sized = type(metric) not in _NAMES_OF_SOURCES
     return sized and isinstance(energy(options), NormalMetric)
