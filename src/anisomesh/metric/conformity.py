@@ -71,8 +71,8 @@ class Conformity:
     of_count
         The length at which equilateral triangles have as many vertices as the mesh.
     mean, median
-        Mean and median of the lengths of the edges. Lengths are in model units where the metric is computed on the surface, and pure
-        numbers where it is prescribed by tensors or sizes.
+        Mean and median length of the edges. Lengths are in model units where the metric is computed on the surface, and
+        pure numbers where it is prescribed by tensors or sizes.
     quantiles
         The 5, 25, 50, 75 and 95 % quantiles of the lengths, over the length asked for, or else ``of_count``.
     share
