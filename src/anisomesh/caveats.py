@@ -12,6 +12,7 @@ from anisomesh.cvt.lbfgs import Optimised, Status
 from anisomesh.delaunay.meshing import ValidMesh
 from anisomesh.mesh.surface import Surface
 from anisomesh.mesh.validity import Validity
+from anisomesh.metric.conformity import Conformity
 from anisomesh.options import RemeshOptions
 from anisomesh.repair.prepare import PrepareReport
 from anisomesh.resolve import embedding_name, is_designed
@@ -19,6 +20,7 @@ from anisomesh.resolve import embedding_name, is_designed
 _AT_CORNER = 1e-3  # of the diagonal, within which a vertex is at a corner
 _VOLUME_TOLERANCE = 0.05  # share by which the enclosed volume may change without a remark
 _FEATURE_TOLERANCE = 0.25  # mean edge lengths from prescribed edges to edges of the result without a remark
+_OFF_SHARE = 0.05  # of a mesh on which lengths may be off without a remark
 COUNT_TOLERANCE = 0.02  # share of the vertices asked for by which a result may differ without a remark
 
 
@@ -57,6 +59,16 @@ def losses_of_shape(
         change = abs(after - before) / abs(before)
         word = "larger" if abs(after) > abs(before) else "smaller"
         yield f"the enclosed volume is {change:.0%} {word} than before; ask for more vertices"
+
+
+def unfollowed_sizes(agreement: Conformity) -> Iterator[str]:
+    """Yield a sentence if edges do not have the lengths that a metric asks for on a considerable part of a mesh."""
+    if agreement.off_share >= _OFF_SHARE:
+        smaller = "more vertices" if agreement.asked is None else "smaller sizes"
+        yield (
+            f"edges do not have the lengths that the metric asks for on {agreement.off_share:.0%} of the mesh, where "
+            f"they are up to {agreement.off_factor:.2f} times as long; ask for {smaller}, or sizes that vary less"
+        )
 
 
 def caveats(

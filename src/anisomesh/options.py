@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 import os
+from collections.abc import Callable
 from dataclasses import dataclass, fields, replace
 from typing import TYPE_CHECKING, Any, Literal, get_args
 
@@ -15,6 +16,7 @@ from anisomesh.toml import hint
 if TYPE_CHECKING:  # the command line imports this module, and has to start at once
     import numpy.typing as npt
 
+    from anisomesh._arrays import Points
     from anisomesh.cvt.energy import Energy
     from anisomesh.embedding.embedder import Embedder
     from anisomesh.metric.field import MetricSource
@@ -25,7 +27,8 @@ MAX_THREADS = 1024
 MIN_VERTICES = 4  # a tetrahedron
 _LARGEST_RATIO = 1e12  # vertices per vertex of the input; more is a mistake
 _NUMBERS = ("sharpness", "feature_angle", "weld_tolerance", "shape_weight")
-_OPTIONAL_NUMBERS = ("final_sharpness", "time_limit")
+_SIZES = ("edge_length", "min_size", "max_size", "gradation")
+_OPTIONAL_NUMBERS = ("final_sharpness", "time_limit", *_SIZES)
 _LEAST = {"seed": 0, "threads": 1, "lloyd_iterations": 0, "max_iterations": 0, "embedding_iterations": 1}
 
 EMBEDDINGS: tuple[EmbeddingName, ...] = get_args(EmbeddingName)
@@ -46,6 +49,19 @@ class RemeshOptions:
     metric
         ``"curvature"``, ``"approximation"``, ``"uniform"``; tensors (V, 3, 3) at the points of the input, in model
         units; or a :class:`~anisomesh.metric.field.MetricSource`, such as ``Curvature()`` or ``Neural("file")``.
+    edge_length
+        Instead of a number of vertices, which then follows: the length of the edges in the metric, in model units if it
+        is ``"curvature"`` (there of edges along the smaller curvature) or ``"uniform"``, and as M measures it if it is
+        tensors.
+    size_field
+        Lengths of edges in model units, for the metric ``"uniform"``: one for each point of the input (V,), or a
+        function of points (n, 3) that returns lengths (n,). Without a number of vertices they are absolute, and the
+        number follows; with one only their ratios matter.
+    min_size, max_size
+        Bounds of the sizes in ``size_field``, in model units.
+    gradation
+        Largest difference of the sizes in ``size_field`` over the distance along edges of the surface: larger sizes are
+        lowered.
     embedding
         ``"direct"``: the metric is measured; ``"filtered"``: the same after filters have removed noise;
         ``"neural"``: short for ``metric=Neural(weights, device, denoise)``; ``"hybrid"``: the same for ``Hybrid``, a
@@ -100,6 +116,11 @@ class RemeshOptions:
     sharpness: float = 7.0
     final_sharpness: float | None = None
     metric: MetricName | npt.NDArray[Any] | MetricSource = "curvature"
+    edge_length: float | None = None
+    size_field: npt.ArrayLike | Callable[[Points], npt.ArrayLike] | None = None
+    min_size: float | None = None
+    max_size: float | None = None
+    gradation: float | None = None
     embedding: str | Embedder = "auto"
     energy: Energy | None = None
     density: npt.ArrayLike | None = None
@@ -139,6 +160,7 @@ class RemeshOptions:
                 raise OptionError(f"{name} = {getattr(self, name)!r}; expected True or False")
         if not isinstance(self.weights, str | os.PathLike | None):
             raise OptionError(f"weights = {self.weights!r}; expected the name of a network or of a file")
+        self._check_sizes()
         self._check_stages()
 
     def _read_numbers(self) -> None:
@@ -152,6 +174,38 @@ class RemeshOptions:
             if name == "max_iterations" and self.max_iterations is None:
                 continue
             object.__setattr__(self, name, whole_number(name, getattr(self, name), low))
+
+    def _check_sizes(self) -> None:
+        """Check edge length, size field and its limits, and that they fit each other and the metric."""
+        for name in _SIZES:
+            value = getattr(self, name)
+            if value is not None and not (math.isfinite(value) and value > 0.0):
+                raise OptionError(f"{name} = {value}; expected a positive finite number")
+        if self.absolute_length is not None and self.density is not None:
+            raise OptionError(
+                "a density and an edge_length or size_field both say how large triangles are; leave one out"
+            )
+        metric = self.metric if isinstance(self.metric, str) else type(self.metric).__name__
+        if self.size_field is None:
+            for name in _SIZES[1:]:
+                if getattr(self, name) is not None:
+                    raise OptionError(f"{name} limits a size_field, and there is none; give one or leave it out")
+            if self.edge_length is not None and metric in ("approximation", "Approximation"):
+                raise OptionError("lengths in the metric 'approximation' have no unit; use max_error, or n_vertices")
+            return
+        if metric != "uniform":
+            raise OptionError(f"a size_field goes with metric='uniform', and the metric is {metric!r}")
+        if self.edge_length is not None:
+            raise OptionError(
+                "edge_length is one length for all edges, and size_field says it everywhere; leave one out"
+            )
+        if self.min_size is not None and self.max_size is not None and self.min_size > self.max_size:
+            raise OptionError(f"min_size = {self.min_size} is above max_size = {self.max_size}")
+
+    @property
+    def absolute_length(self) -> float | None:
+        """Length in the metric that edges are to have if no number of vertices is given, None if there is none."""
+        return 1.0 if self.size_field is not None else self.edge_length
 
     def _check_stages(self) -> None:
         """Check metric, embedding and energy, and that they fit each other."""
@@ -200,10 +254,18 @@ def with_overrides(options: Any, overrides: dict[str, Any]) -> RemeshOptions:
     return replace(options, **overrides)
 
 
-def read_target(n_vertices: object, ratio: object, max_error: object) -> tuple[int | None, float | None, float | None]:
-    """Return the one of the three that is given, as a number in range, and None for the others."""
-    if sum(value is not None for value in (n_vertices, ratio, max_error)) != 1:
-        raise OptionError("give one of n_vertices, ratio and max_error")
+def read_target(
+    n_vertices: object, ratio: object, max_error: object, options: RemeshOptions
+) -> tuple[int | None, float | None, float | None]:
+    """Return the one of the three that is given, as a number in range, and None for the others.
+
+    All are None if the options have an edge length, or a size field and none is given.
+    """
+    given = sum(value is not None for value in (n_vertices, ratio, max_error))
+    if given + (options.edge_length is not None) != 1 and (given or options.size_field is None):
+        raise OptionError("give one of n_vertices, ratio, max_error and edge_length")
+    if not given:
+        return None, None, None
     if n_vertices is not None:
         return whole_number("n_vertices", n_vertices, MIN_VERTICES), None, None
     if max_error is not None:

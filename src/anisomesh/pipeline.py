@@ -6,11 +6,13 @@ import logging
 import os
 from contextlib import nullcontext
 from dataclasses import dataclass, replace
+from functools import partial
 from typing import Any
 
 import numpy.typing as npt
 
-from anisomesh.caveats import caveats, losses_of_repair, losses_of_shape
+from anisomesh.caveats import caveats, losses_of_repair, losses_of_shape, unfollowed_sizes
+from anisomesh.counts.search import smallest_within
 from anisomesh.cvt.lbfgs import Optimised
 from anisomesh.cvt.schedule import DualFeedback, optimise_sites
 from anisomesh.delaunay.creases import missing_on_creases
@@ -23,19 +25,20 @@ from anisomesh.execution.run import OPTIMISATION_SHARE, Run
 from anisomesh.features.tagged import distance_to_crease_edges
 from anisomesh.fitting.target import FitTarget
 from anisomesh.fitting.valid import fit_without_faults
-from anisomesh.inputs import PreparedInput, prepared_input
 from anisomesh.io.describe import soundness
 from anisomesh.io.meshes import surface_of
 from anisomesh.mesh.surface import Surface
 from anisomesh.mesh.validity import Validity, check_validity
+from anisomesh.metric.conformity import Conformity, MetricExtent, conformity
 from anisomesh.options import MIN_VERTICES, RemeshOptions, read_target, with_overrides
 from anisomesh.resolve import (
     cvt_options,
     embedding_name,
 )
 from anisomesh.result import RemeshResult
-from anisomesh.search import smallest_within
-from anisomesh.tasks import set_up
+from anisomesh.setup.inputs import PreparedInput, prepared_input
+from anisomesh.setup.measured import count_for_length, unit_of_lengths
+from anisomesh.setup.tasks import Tasks, set_up
 from anisomesh.voronoi.restricted import RestrictedVoronoi
 
 logger = logging.getLogger(__name__)
@@ -64,7 +67,8 @@ def remesh(
     faces
         Triangles (F, 3), if the first argument is an array of points.
     n_vertices
-        Vertices of the result, at least 4.
+        Vertices of the result, at least 4. Without this, ``ratio`` and ``max_error`` the option ``edge_length`` or
+        ``size_field`` says how many.
     ratio
         Instead of ``n_vertices``: vertices as a share of those of the prepared input.
     max_error
@@ -102,7 +106,7 @@ def remesh(
     if on_step is not None and not callable(on_step):
         raise OptionError(f"on_step = {on_step!r}; expected a function of a StepInfo")
     run = Run(on_step or ignore_steps, deadline)
-    n_vertices, ratio, max_error = read_target(n_vertices, ratio, max_error)
+    n_vertices, ratio, max_error = read_target(n_vertices, ratio, max_error, options)
     with run.stage("load") if isinstance(mesh, str | os.PathLike) else nullcontext():
         surface = surface_of(mesh, faces)
     with run.stage("prepare"):
@@ -116,24 +120,41 @@ def remesh(
             return _remesh(source, n, options, run, nearest=True)
 
         return smallest_within(with_vertices, prepared, max_error, deadline)
-    n = n_vertices or max(MIN_VERTICES, round((ratio or 0.0) * prepared.n_points))
-    return _remesh(source, n, options, run)
+    if ratio is not None:
+        n_vertices = max(MIN_VERTICES, round(ratio * prepared.n_points))
+    if n_vertices is None:
+        return _remesh(source, count_for_length(source, options, run), options, run, asked=options.absolute_length)
+    return _remesh(source, n_vertices, options, run)
 
 
-def _remesh(source: PreparedInput, n: int, options: RemeshOptions, run: Run, *, nearest: bool = False) -> RemeshResult:
-    """Remesh a prepared surface with n vertices; ``nearest`` if the distance counts more than the shape."""
+def _remesh(
+    source: PreparedInput,
+    n: int,
+    options: RemeshOptions,
+    run: Run,
+    *,
+    nearest: bool = False,
+    asked: float | None = None,
+) -> RemeshResult:
+    """Remesh a prepared surface with n vertices.
+
+    ``nearest`` if the distance counts more than the shape, and ``asked`` is the length of edges in the metric if that
+    was asked for.
+    """
     prepared, tasks = source.prepared, set_up(source, n, options, run, nearest=nearest)
     frame, task, field = tasks.frame, tasks.dual, tasks.field
     run.check_time()
+    order = task.voronoi.embedded.face_order
     made = _valid_mesh(task, tasks.fit, tasks.options, run)
     mesh, optimised, validity = made.mesh, made.optimised, made.validity
+    agreement = _agreement(mesh, tasks, asked) if asked or task.error_weights is not None else None
     return RemeshResult(
         surface=Surface(frame.to_model(mesh.points), mesh.faces),
         prepared=prepared.surface,
         prepare_report=prepared.report,
         working=task.voronoi.embedded.surface,
         tensors=field.tensors,
-        corner_tensors=field.corner_tensors,
+        corner_tensors=None if field.corner_tensors is None else field.corner_tensors[order],
         embedding_name=embedding_name(tasks.options),
         noise=field.noise,
         frame=frame,
@@ -155,8 +176,21 @@ def _remesh(source: PreparedInput, n: int, options: RemeshOptions, run: Run, *, 
                 tasks.surface, Surface(mesh.points, mesh.faces), task.corner_places, made.feature_distance
             ),
             *caveats(n, field.noise, mesh, validity, optimised, tasks.options),
+            *(() if agreement is None else unfollowed_sizes(agreement)),
         ),
+        conformity=agreement,
         feature_distance=made.feature_distance * frame.scale,
+    )
+
+
+def _agreement(mesh: ValidMesh, tasks: Tasks, asked: float | None) -> Conformity:
+    """Return how well the edges of a mesh have the lengths that the metric asks for."""
+    return conformity(
+        Surface(mesh.points, mesh.faces),
+        tasks.metric,
+        MetricExtent.of(tasks.metric.surface.surface, tasks.metric.field),
+        asked=asked,
+        unit=unit_of_lengths(tasks.options, tasks.frame),
     )
 
 
@@ -197,8 +231,8 @@ def _mesh_of_start(task: MeshingTask, target: FitTarget | None, options: RemeshO
             task.voronoi,
             task.n_vertices,
             task.features,
-            cvt_options(options),
-            feedback=DualFeedback(dual_squared_errors, missing_on_creases),
+            cvt_options(options, sized=task.error_weights is not None),
+            feedback=DualFeedback(partial(dual_squared_errors, weights=task.error_weights), missing_on_creases),
             on_step=run.on_step,
             deadline=run.deadline.share(OPTIMISATION_SHARE),
         )

@@ -122,19 +122,33 @@ def follows_creases(options: RemeshOptions) -> bool:
     return energy(options) != NormalMetric(1.0)
 
 
+def prescribes_sizes(options: RemeshOptions) -> bool:
+    """Return whether the metric of the user says how large triangles are, which then counts more than the distance.
+
+    So it is with sizes, tensors and metric sources that are not built in, unless an own energy has the last word.
+    """
+    metric = options.metric
+    if isinstance(metric, str | Uniform):
+        sized = options.absolute_length is not None and metric in ("uniform", Uniform())
+    else:
+        sized = type(metric) not in _NAMES_OF_SOURCES
+    return sized and isinstance(energy(options), NormalMetric)
+
+
 def fit_plan(options: RemeshOptions, surface: Surface, *, nearest: bool = False) -> FitPlan | None:
     """Return how the mesh is fitted to the prepared input at the end, None if it is not.
 
     With the metric for the least distance the error counts more than by default, and on a designed surface a decimation
-    is fitted; so it is on any surface if a distance is what is asked for (``nearest``). A density says where points go,
-    so none are exchanged and nothing is decimated, and an own energy has the last word.
+    is fitted; so it is on any surface if a distance is what is asked for (``nearest``). Prescribed sizes and a density
+    say where points go, so none are exchanged and nothing is decimated, and an own energy has the last word.
     """
     if not is_fitted(options):
         return None
     named = isinstance(options.metric, str) and options.metric == "approximation"
     least_distance = nearest or named or isinstance(options.metric, Approximation)
     chosen, decimation = _NEAREST if least_distance else FitOptions(), None
-    if options.density is not None:
+    sized = prescribes_sizes(options) and not nearest
+    if options.density is not None or sized:
         chosen = replace(chosen, rounds=0)
     elif nearest:
         decimation = _NEAREST
@@ -144,6 +158,7 @@ def fit_plan(options: RemeshOptions, surface: Surface, *, nearest: bool = False)
     return FitPlan(
         mesh=chosen.weighted(weight),
         decimation=None if decimation is None else decimation.weighted(weight),
+        relative=sized,
         threads=options.threads,
     )
 
@@ -153,13 +168,12 @@ def is_fitted(options: RemeshOptions) -> bool:
     return options.fit and isinstance(energy(options), NormalMetric)
 
 
-def cvt_options(options: RemeshOptions) -> CVTOptions:
-    """Return how sites are optimised."""
+def cvt_options(options: RemeshOptions, *, sized: bool = False) -> CVTOptions:
+    """Return how sites are optimised; ``sized`` if their numbers per area are prescribed, so none are sampled anew."""
     wanted, final = energy(options), options.final_sharpness
     resampling: Energy | None = wanted
     if isinstance(wanted, NormalMetric):
-        plain = wanted.sharpness == 1.0
-        resampling = None if plain else NormalMetric(_RESAMPLING_FACTOR * wanted.sharpness)
+        resampling = None if sized or wanted.sharpness == 1.0 else NormalMetric(_RESAMPLING_FACTOR * wanted.sharpness)
     return CVTOptions(
         energy=wanted,
         final_energy=None if final is None else NormalMetric(final),

@@ -15,6 +15,7 @@ from anisomesh.io.rvd import PolygonMesh, save_polygons
 from anisomesh.mesh.geometry import Frame
 from anisomesh.mesh.surface import Surface
 from anisomesh.mesh.validity import Validity
+from anisomesh.metric.conformity import Conformity
 from anisomesh.repair.prepare import PrepareReport
 from anisomesh.voronoi.cells import CellComplex
 from anisomesh.voronoi.diagram import Diagram
@@ -65,6 +66,9 @@ class RemeshResult:
     feature_distance
         Largest distance from the edges in ``features`` to edges of the result that follow them, in model units; 0
         without such edges, infinite if they are lost.
+    conformity
+        How well the edges have the lengths asked for; None unless ``edge_length``, ``size_field`` or a metric of the
+        user prescribes them.
     seconds
         Wall-clock seconds per stage.
     warnings
@@ -94,6 +98,7 @@ class RemeshResult:
     warnings: tuple[str, ...]
     distance: float | None = None
     feature_distance: float = 0.0
+    conformity: Conformity | None = None
 
     def __repr__(self) -> str:
         return (
@@ -136,6 +141,7 @@ class RemeshResult:
             "seconds": dict(self.seconds),
             "distance": self.distance,
             "feature_distance": self.feature_distance if isfinite(self.feature_distance) else None,
+            "conformity": None if self.conformity is None else self.conformity.as_dict(),
             "embedding": self.embedding_name,
             "noise": self.noise,
             "energy": self.energy,

@@ -11,6 +11,7 @@ from anisomesh import pipeline
 from anisomesh.errors import MeshError, MeshFileError, MetricError, OptionError
 from anisomesh.mesh.distance import surface_distance
 from anisomesh.mesh.surface import Surface
+from anisomesh.metric.field import mean_at_points
 from anisomesh.metric.quality import anisotropic_quality
 from anisomesh.metric.tensors import metric_root
 from anisomesh.shapes.analytic import cad_part, cylinder, open_patch, sphere, torus
@@ -162,11 +163,16 @@ def test_an_exception_in_the_callback_ends_the_work(ring):
         anisomesh.remesh(ring, n_vertices=100, on_step=stop)
 
 
+def test_tensors_at_corners_belong_to_the_faces_of_the_working_surface():
+    result = anisomesh.remesh(anisomesh.sample(), n_vertices=300, embedding="direct", max_iterations=2, fit=False)
+    np.testing.assert_allclose(mean_at_points(result.working, result.corner_tensors), result.tensors, rtol=1e-9)
+
+
 @pytest.mark.parametrize(
     ("options", "words"),
     [
-        ({}, "give one of n_vertices, ratio and max_error"),
-        ({"n_vertices": 100, "ratio": 0.5}, "give one of n_vertices, ratio and max_error"),
+        ({}, "give one of n_vertices, ratio, max_error and edge_length"),
+        ({"n_vertices": 100, "ratio": 0.5}, "give one of n_vertices, ratio, max_error and edge_length"),
         ({"n_vertices": 3}, "at least 4"),
         ({"n_vertices": 0}, "at least 4"),
         ({"n_vertices": 10.5}, "whole number"),

@@ -10,13 +10,13 @@ import trimesh
 from edge_distance import distance_to_edges
 
 import anisomesh
+from anisomesh.counts.search import smallest_within
 from anisomesh.errors import AnisomeshError, OptionError, TimeLimitError
 from anisomesh.execution.deadline import Deadline
 from anisomesh.features.detect import points_along
 from anisomesh.mesh import topology
 from anisomesh.mesh.distance import hausdorff_distance, surface_distance
 from anisomesh.mesh.surface import Surface
-from anisomesh.search import smallest_within
 from anisomesh.shapes.analytic import cad_features, cad_part, cylinder, ellipsoid, open_patch, sphere, torus
 
 COUNTS = {
@@ -179,6 +179,17 @@ def test_the_command_searches_for_a_count(run_cli, tmp_path, torus_obj, text):
     assert 0.5 * limit < report["distance"] <= limit
 
 
+def test_the_command_takes_a_length_of_edges(run_cli, tmp_path, torus_obj):
+    words = ("remesh", torus_obj, "-o", tmp_path / "out.ply", "--metric", "uniform", "--edge-length")
+    done = run_cli(*words, "6%")
+    assert done.returncode == 0, done.stderr
+    assert "median length" in done.stdout
+    length = 0.06 * anisomesh.load(torus_obj).diagonal
+    assert np.median(anisomesh.load(tmp_path / "out.ply").edge_lengths) == pytest.approx(length, rel=0.05)
+    assert run_cli(*words, "0").returncode == 2
+    assert run_cli(*words, "6%", "-n", 100).returncode == 2
+
+
 @pytest.mark.parametrize("text", ["0", "-1", "x", "%", "nan"])
 def test_invalid_lengths_are_refused(run_cli, tmp_path, torus_obj, text):
     done = run_cli("remesh", torus_obj, "-o", tmp_path / "out.ply", f"--max-error={text}")
@@ -236,7 +247,7 @@ def test_a_time_limit_ends_the_search_with_the_best_result_so_far():
 
 def test_one_of_the_ways_to_ask_is_wanted():
     for asked in ({}, {"n_vertices": 9, "max_error": 0.1}, {"ratio": 0.1, "max_error": 0.1}):
-        with pytest.raises(AnisomeshError, match="one of n_vertices, ratio and max_error"):
+        with pytest.raises(AnisomeshError, match="one of n_vertices, ratio, max_error and edge_length"):
             anisomesh.remesh(sphere(1), **asked)
 
 

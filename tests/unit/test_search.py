@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from anisomesh.search import COUNT_PRECISION, Counts, smallest_count
+from anisomesh.counts.search import COUNT_PRECISION, Counts, smallest_count
 from conftest import pairwise
 
 

@@ -45,6 +45,14 @@ def command(
             help="As few vertices as keep within this distance of the input, such as 0.2 or 0.1% of the diagonal.",
         ),
     ] = None,
+    edge_length: Annotated[
+        str | None,
+        target_option(
+            metavar="LENGTH",
+            help="As many vertices as edges of this length take, such as 0.2 or 2% of the diagonal; with metric "
+            "curvature along the smaller curvature.",
+        ),
+    ] = None,
     out: Annotated[
         Path | None,
         _output(
@@ -90,9 +98,10 @@ def command(
     quiet: Quiet = False,
     **options: Any,
 ) -> None:
-    """Remesh IN with anisotropic triangles. Give -n, --ratio or --max-error; - is standard input or output."""
-    if (n_vertices, ratio, max_error).count(None) != 2:
-        raise typer.BadParameter("give one of -n (number of vertices), --ratio and --max-error")
+    """Remesh IN with anisotropic triangles. Give -n, --ratio, --max-error or --edge-length; - is standard input."""
+    if (n_vertices, ratio, max_error, edge_length).count(None) != 3:
+        raise typer.BadParameter("give one of -n (number of vertices), --ratio, --max-error and --edge-length")
+    length = None if edge_length is None else Length.parse(edge_length, "--edge-length")
     error = None if max_error is None else Length.parse(max_error, "--max-error")
     gap = None if weld in (None, "auto") else Length.parse(weld, "--weld")
     out = default_output(source, input_format, output_format) if out is None else out
@@ -113,6 +122,7 @@ def command(
         surface, seconds = read(source, input_format)
         options |= {"n_vertices": n_vertices, "ratio": ratio}
         options["max_error"] = None if error is None else error.on(surface)
+        options["edge_length"] = None if length is None else length.on(surface)
         if weld is not None:
             options["weld_tolerance"] = "auto" if gap is None else gap.on(surface)
         result, facts = run_remesh(surface, display, name=str(source), load_seconds=seconds, **options)

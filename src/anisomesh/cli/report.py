@@ -83,6 +83,7 @@ def summary(report: dict[str, Any], written: Sequence[Path], notes: Sequence[str
         ("faces", f"{report['faces']:,}"),
         ("surface", describe_validity(report["validity"])),
         *([("distance", f"at most {report['distance']:.4g} from the input")] if report.get("distance") else []),
+        *([("edges", describe_lengths(report["conformity"]))] if report.get("conformity") else []),
         (
             "stretch",
             f"mean {stretch['mean']:.2f}, largest {stretch['max']:.2f} (of the triangles; 1 = equilateral)",
@@ -96,6 +97,13 @@ def summary(report: dict[str, Any], written: Sequence[Path], notes: Sequence[str
         *(("wrote", str(path)) for path in written),
     ]
     return table(rows)
+
+
+def describe_lengths(conformity: dict[str, Any]) -> str:
+    """Return in words how long the edges are in the metric."""
+    asked = conformity["asked"]
+    target = f"{conformity['of_count']:.4g} fits the count" if asked is None else f"asked for {asked:.4g}"
+    return f"median length {conformity['median']:.4g} ({target}), {conformity['share']:.0%} within a factor of 1.41"
 
 
 def describe_validity(validity: dict[str, Any]) -> str:

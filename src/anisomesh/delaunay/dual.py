@@ -74,13 +74,17 @@ def dual_mesh(cells: CellComplex) -> Dual:
     )
 
 
-def dual_squared_errors(diagram: Diagram) -> PointScalars | None:
-    """Return the squared distance of each point of the surface (V,) to the dual of a diagram, None if that is empty."""
+def dual_squared_errors(diagram: Diagram, weights: PointScalars | None = None) -> PointScalars | None:
+    """Return the squared distance of each point of the surface (V,) to the dual of a diagram, None if that is empty.
+
+    They are multiplied by weights (V,) if there are any.
+    """
     dual, embedded = dual_mesh(cell_complex(diagram)), diagram.embedded
     if len(dual.faces) == 0:
         return None
     mesh = Surface(dual.points[:, :3] / embedded.scale, dual.faces)
-    return ClosestPoints(mesh).squared_distances(embedded.surface.points)
+    squared = ClosestPoints(mesh).squared_distances(embedded.surface.points)
+    return squared if weights is None else weights * squared
 
 
 def _edge_points(diagram: Diagram, edge: npt.NDArray[np.int32]) -> EmbeddedPoints:

@@ -7,7 +7,7 @@ from functools import cached_property
 
 import numpy as np
 
-from anisomesh._arrays import EdgeEnds, Faces, Points, PointTensors, Sites
+from anisomesh._arrays import EdgeEnds, Faces, Points, PointScalars, PointTensors, Sites
 from anisomesh.delaunay.delta_complex import simplicial_mesh
 from anisomesh.delaunay.dual import dual_mesh
 from anisomesh.delaunay.faults import points_at_faults
@@ -57,6 +57,8 @@ class MeshingTask:
         Vertices asked for.
     deadline
         When to stop repairing faults.
+    error_weights
+        Weights (V,) of squared distances, by which points that the dual misses are found; None for 1 everywhere.
     """
 
     voronoi: RestrictedVoronoi
@@ -65,6 +67,7 @@ class MeshingTask:
     tensors: PointTensors
     n_vertices: int
     deadline: Deadline = NO_DEADLINE
+    error_weights: PointScalars | None = None
 
     @cached_property
     def reference(self) -> ClosestPoints:

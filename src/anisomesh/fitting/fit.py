@@ -57,12 +57,16 @@ class FitPlan:
         How a mesh is fitted.
     decimation
         How a decimation of the surface is fitted in place of the mesh, None if it is not.
+    relative
+        Whether distances count relative to the area that the metric gives a triangle, not as they are. Where triangles
+        are ten times as large, their distances are a hundred times as large, and would draw all points there.
     threads
         Number of threads; the result does not depend on it.
     """
 
     mesh: FitOptions = field(default_factory=FitOptions)
     decimation: FitOptions | None = None
+    relative: bool = False
     threads: int = 1
 
 

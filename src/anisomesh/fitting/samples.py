@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 import numpy.typing as npt
 
 from anisomesh._arrays import EdgeMask, Points, PointTensors
 from anisomesh.mesh.surface import Surface
+from anisomesh.metric.tensors import area_factors_of_tensors
 from anisomesh.metric.transfer import PlacedMetric
 
 _METRIC_INSET = 1e-3  # of the way from a crease to the barycentre of a face, where the metric is the one of that face
@@ -38,6 +39,15 @@ class SurfaceSamples:
     normals: Floats
     weights: Floats
     roots: PointTensors
+
+    def relative(self) -> SurfaceSamples:
+        """Return the samples with weights times the square of the area factor of the metric, their sum the same.
+
+        The factor is the area in the metric over the area.
+        """
+        factors = area_factors_of_tensors(self.roots @ self.roots, self.normals)
+        weights = self.weights * (factors / factors.mean()) ** 2
+        return replace(self, weights=weights * (self.weights.sum() / weights.sum()))
 
     @property
     def count(self) -> int:

@@ -80,13 +80,14 @@ class FitTarget:
             metric=metric,
             rng=np.random.default_rng(0),
         )
+        plan = FitPlan() if plan is None else plan
         return cls(
             reference=reference,
-            samples=samples,
+            samples=samples.relative() if plan.relative else samples,
             corners=corners,
             holds_creases=holds_creases,
             crease_angle=crease_angle,
-            plan=FitPlan() if plan is None else plan,
+            plan=plan,
         )
 
     def at_corners(self, points: Points) -> PointMask:

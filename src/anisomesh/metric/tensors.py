@@ -227,6 +227,15 @@ def metric_root(tensors: PointTensors) -> PointTensors:
     return np.asarray((vectors * np.sqrt(np.maximum(eigenvalues, 0.0))[:, None, :]) @ vectors.transpose(0, 2, 1))
 
 
+def area_factors_of_tensors(tensors: PointTensors, normals: npt.NDArray[np.float64]) -> npt.NDArray[np.float64]:
+    """Return the area in the metric (n, 3, 3) over the area (n,) in planes with unit normals (n, 3); 0 without normal.
+
+    It is the root of det M n^t M^-1 n.
+    """
+    inverse = np.linalg.solve(tensors, normals[:, :, None])[:, :, 0]
+    return np.asarray(np.sqrt(np.maximum(np.linalg.det(tensors) * np.einsum("nx,nx->n", normals, inverse), 0.0)))
+
+
 def _clamped(curvature: PrincipalCurvatures, limits: tuple[float, float]) -> tuple[PointScalars, PointScalars]:
     """Return the smaller and the larger curvature magnitude (V,), clamped to the limits."""
     low, high = limits

@@ -2,36 +2,32 @@
 
 from __future__ import annotations
 
-import logging
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
-from anisomesh._arrays import EdgeMask, PointMask
+from anisomesh._arrays import CornerTensors, EdgeMask, PointMask, PointScalars, PointTensors
 from anisomesh.delaunay.meshing import MeshingTask
 from anisomesh.embedding.base import Embedding
+from anisomesh.embedding.density import area_factors, density_of_sizes
 from anisomesh.embedding.embedder import checked_embedding
-from anisomesh.execution.memory import check_memory
 from anisomesh.execution.run import Run
-from anisomesh.features.detect import WEAK_ANGLE, apexes, sharp_edges
+from anisomesh.features.detect import sharp_edges
 from anisomesh.features.network import FeatureNetwork, trace_features
 from anisomesh.fitting.fit import FitPlan
 from anisomesh.fitting.target import FitTarget
-from anisomesh.inputs import PreparedInput
 from anisomesh.mesh.closest_points import ClosestPoints
 from anisomesh.mesh.embedded_surface import EmbeddedSurface
-from anisomesh.mesh.geometry import Frame, unit_frame
+from anisomesh.mesh.geometry import Frame
 from anisomesh.mesh.surface import Surface
-from anisomesh.mesh.working_surface import working_surface
-from anisomesh.metric.field import MetricField, checked_field
-from anisomesh.metric.narrow_patches import limit_to_patches
+from anisomesh.metric.field import MetricField
 from anisomesh.metric.thin_walls import separate_thin_walls
 from anisomesh.metric.transfer import PlacedMetric
 from anisomesh.options import RemeshOptions
-from anisomesh.resolve import embedder, fit_plan, follows_creases, metric_source, with_embedding_chosen
+from anisomesh.resolve import embedder, fit_plan, follows_creases, prescribes_sizes
+from anisomesh.setup.inputs import PreparedInput
+from anisomesh.setup.measured import measure
 from anisomesh.voronoi.restricted import RestrictedVoronoi
-
-logger = logging.getLogger(__name__)
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -48,8 +44,10 @@ class Tasks:
         The surface that the mesh is to approximate, at bounding-box diagonal 1.
     field
         The metric on the embedded surface.
+    metric
+        The same there with what a density adds, if sizes are prescribed.
     embedding
-        The embedding of that.
+        The embedding of that surface.
     dual
         The task to make a mesh from sites.
     fit
@@ -60,6 +58,7 @@ class Tasks:
     frame: Frame
     surface: Surface
     field: MetricField
+    metric: PlacedMetric
     embedding: Embedding
     dual: MeshingTask
     fit: FitTarget | None
@@ -70,57 +69,62 @@ def set_up(source: PreparedInput, n: int, options: RemeshOptions, run: Run, *, n
 
     ``nearest`` if the distance counts more than the shape.
     """
-    prepared = source.prepared
-    with run.stage("prepare"):
-        frame = unit_frame(prepared.surface.points)
-        surface = prepared.surface.with_points(frame.to_unit(prepared.surface.points))
-        options = with_embedding_chosen(options, surface)
-        creases = sharp_edges(surface, min(options.feature_angle, WEAK_ANGLE))
-        split = working_surface(surface, n, creases=creases, tagged=source.tagged)
-        tips = apexes(split.coarse, sharp_edges(split.coarse, options.feature_angle))
-        check_memory(n, split.surface.n_faces)
-        logger.info("working surface: %r; embedding: %s", split.surface, options.embedding)
-    with run.stage("metric"):
-        tensors = None if source.tensors is None else split.interpolate(source.tensors * frame.scale**2)
-        field = checked_field(metric_source(options, surface, tensors)(split.surface), split.surface)
-        working = split.surface
-        if field.points is not None:
-            working = working.with_points(field.points)
-            surface = split.coarse.with_points(field.points[: split.coarse.n_points])
-        field = limit_to_patches(field, working, n)
+    measured = measure(source, n, options, run)
+    options, surface, split = measured.options, measured.surface, measured.split
+    working, field = measured.working, measured.field
     with run.stage("embed"):
         apart = separate_thin_walls(field, working, n, options.feature_angle) if follows_creases(options) else field
         embedding = checked_embedding(embedder(options)(working, apart), working)
         density = None if source.density is None else split.interpolate(source.density)
+        asked, weights = _with_density(field, density, working), None
+        if prescribes_sizes(options) and not nearest:
+            density = density_of_sizes(working, _given(_with_density(apart, density, working)), embedding.points)
+            weights = area_factors(working, _given(asked)) ** 2
         embedded = EmbeddedSurface(working, embedding.points, embedding.scale, density)
         task = MeshingTask(
             voronoi=RestrictedVoronoi(embedded, threads=options.threads),
-            features=_features(embedded, n, split.tagged, tips, options),
+            features=_features(embedded, n, split.tagged, measured.tips, options),
             surface=surface,
             tensors=field.tensors,
             n_vertices=n,
             deadline=run.deadline,
+            error_weights=weights,
         )
         plan = fit_plan(options, surface, nearest=nearest)
-        target = None if plan is None else _fit_target(task, working, field, plan, options.feature_angle)
+        metric = PlacedMetric(ClosestPoints(working), field if weights is None else asked)
+        target = None if plan is None else _fit_target(task, metric, plan, options.feature_angle)
     return Tasks(
         options=options,
-        frame=frame,
+        frame=measured.frame,
         surface=surface,
         field=field,
+        metric=metric,
         embedding=embedding,
         dual=task,
         fit=target,
     )
 
 
-def _fit_target(
-    task: MeshingTask, working: Surface, field: MetricField, plan: FitPlan, crease_angle: float
-) -> FitTarget:
-    """Return what meshes are fitted to; the field is on the working surface."""
+def _with_density(field: MetricField, density: PointScalars | None, surface: Surface) -> MetricField:
+    """Return a metric field times the root of a density (V,), as the area of triangles is to be divided by it."""
+    if density is None:
+        return field
+    root, corners = np.sqrt(density), field.corner_tensors
+    if corners is not None:
+        corners = root[surface.faces][:, :, None, None] * corners
+    return replace(field, tensors=root[:, None, None] * field.tensors, corner_tensors=corners)
+
+
+def _given(field: MetricField) -> PointTensors | CornerTensors:
+    """Return the tensors of a field at corners, if it has these, or else at points."""
+    return field.tensors if field.corner_tensors is None else field.corner_tensors
+
+
+def _fit_target(task: MeshingTask, metric: PlacedMetric, plan: FitPlan, crease_angle: float) -> FitTarget:
+    """Return what meshes are fitted to."""
     return FitTarget.of(
         task.reference,
-        PlacedMetric(ClosestPoints(working), field),
+        metric,
         task.n_vertices,
         corners=task.corner_places,
         holds_creases=bool(task.features.required.any()),

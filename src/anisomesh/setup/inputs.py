@@ -12,6 +12,7 @@ from anisomesh._arrays import EdgeMask, PointScalars, PointTensors, real_array
 from anisomesh.errors import MetricError, OptionError
 from anisomesh.features.tagged import tagged_edges
 from anisomesh.mesh.surface import Surface
+from anisomesh.metric.sizes import checked_sizes
 from anisomesh.metric.tensors import validate_metric
 from anisomesh.options import RemeshOptions
 from anisomesh.repair.prepare import Prepared, prepare
@@ -29,6 +30,8 @@ class PreparedInput:
         The prepared surface.
     tensors, density
         Metric (V, 3, 3) and density (V,) at its points, None if they are not prescribed.
+    sizes
+        Lengths of edges at its points (V,), None if there are none or they are a function.
     tagged
         Which of its edges (E,) are features in any case.
     """
@@ -36,6 +39,7 @@ class PreparedInput:
     prepared: Prepared
     tensors: PointTensors | None
     density: PointScalars | None
+    sizes: PointScalars | None
     tagged: EdgeMask
 
 
@@ -49,7 +53,7 @@ def prepared_input(surface: Surface, options: RemeshOptions) -> PreparedInput:
     MetricError
         If prescribed tensors are not symmetric positive definite, one per point of the input.
     OptionError
-        If densities are not positive, one per point, or features are not edges of the input.
+        If densities or sizes are not positive, one per point, or features are not edges of the input.
     """
     prepared = prepare(surface, weld_tolerance=options.weld_tolerance)
     tensors = density = None
@@ -64,10 +68,14 @@ def prepared_input(surface: Surface, options: RemeshOptions) -> PreparedInput:
             raise OptionError(
                 f"density[{where}] = {value:g}; expected a positive weight for each point, below {_LARGEST_DENSITY:g}"
             )
+    sizes = None
+    if options.size_field is not None and not callable(options.size_field):
+        given = _at_prepared("size_field", options.size_field, (surface.n_points,), prepared, OptionError)
+        sizes = checked_sizes(given, prepared.surface.points, prepared.point_source)
     tagged = np.zeros(len(prepared.surface.edges), dtype=bool)
     if options.features is not None:
         tagged = tagged_edges(surface, options.features, prepared.surface, options.weld_tolerance)
-    return PreparedInput(prepared=prepared, tensors=tensors, density=density, tagged=tagged)
+    return PreparedInput(prepared=prepared, tensors=tensors, density=density, sizes=sizes, tagged=tagged)
 
 
 def _at_prepared(

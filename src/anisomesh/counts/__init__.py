@@ -1,0 +1,1 @@
+"""The number of vertices that a distance or a length of edges takes."""

@@ -1,0 +1,128 @@
+"""The metric on the surface that is embedded, and the number of vertices that a length of edges takes in it."""
+
+from __future__ import annotations
+
+import logging
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Any, cast
+
+import numpy as np
+
+from anisomesh._arrays import PointMask, PointTensors, real_array
+from anisomesh.errors import OptionError
+from anisomesh.execution.memory import check_memory
+from anisomesh.execution.run import Run
+from anisomesh.features.detect import WEAK_ANGLE, apexes, sharp_edges
+from anisomesh.mesh.geometry import Frame, unit_frame
+from anisomesh.mesh.surface import Surface
+from anisomesh.mesh.working_surface import WorkingSurface, working_surface
+from anisomesh.metric.conformity import MetricExtent
+from anisomesh.metric.field import MetricField, checked_field
+from anisomesh.metric.narrow_patches import limit_to_patches
+from anisomesh.metric.sizes import checked_sizes, limited_sizes, metric_of_sizes
+from anisomesh.options import MIN_VERTICES, RemeshOptions
+from anisomesh.resolve import metric_source, with_embedding_chosen
+from anisomesh.setup.inputs import PreparedInput
+
+logger = logging.getLogger(__name__)
+
+_FIRST_COUNT = 5_000  # vertices for which the metric is first measured, where their number is not known; heuristic
+_COUNT_ROUNDS, _COUNT_TOLERANCE = 4, 0.01  # of the measurement of the metric for the count found, and its change
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Measured:
+    """A prepared surface with its metric.
+
+    Attributes
+    ----------
+    options
+        The options, with the embedding chosen.
+    frame
+        From model units to bounding-box diagonal 1.
+    surface
+        The surface that the mesh is to approximate, at bounding-box diagonal 1.
+    split, working
+        The surface that is embedded: how it comes about, and itself, its noise removed.
+    tips
+        Which points of the surface are apexes.
+    field
+        The metric on the working surface.
+    """
+
+    options: RemeshOptions
+    frame: Frame
+    surface: Surface
+    split: WorkingSurface
+    tips: PointMask
+    working: Surface
+    field: MetricField
+
+
+def count_for_length(source: PreparedInput, options: RemeshOptions, run: Run) -> int:
+    """Return the number of vertices that edges of the length in the options take on a prepared surface.
+
+    The metric is measured on a surface that depends on the number, so it is measured again until that hardly changes.
+    """
+    n, length = _FIRST_COUNT, float(options.absolute_length or 1.0)
+    for _ in range(_COUNT_ROUNDS):
+        measured = measure(source, n, options, run)
+        extent = MetricExtent.of(measured.working, measured.field)
+        before, n = n, max(MIN_VERTICES, extent.count(length / unit_of_lengths(options, measured.frame)))
+        if abs(n - before) <= _COUNT_TOLERANCE * n:
+            break
+    return n
+
+
+def unit_of_lengths(options: RemeshOptions, frame: Frame) -> float:
+    """Return the factor from lengths in the metric field of a run to lengths as the options mean them.
+
+    A metric that is computed is computed at bounding-box diagonal 1; lengths in prescribed tensors and relative to
+    prescribed sizes have no unit.
+    """
+    computed = isinstance(options.metric, str) or callable(options.metric)
+    return frame.scale if computed and options.size_field is None else 1.0
+
+
+def measure(source: PreparedInput, n: int, options: RemeshOptions, run: Run) -> Measured:
+    """Return the surface and the metric for n vertices."""
+    prepared = source.prepared
+    with run.stage("prepare"):
+        frame = unit_frame(prepared.surface.points)
+        surface = prepared.surface.with_points(frame.to_unit(prepared.surface.points))
+        options = with_embedding_chosen(options, surface)
+        creases = sharp_edges(surface, min(options.feature_angle, WEAK_ANGLE))
+        split = working_surface(surface, n, creases=creases, tagged=source.tagged)
+        tips = apexes(split.coarse, sharp_edges(split.coarse, options.feature_angle))
+        check_memory(n, split.surface.n_faces)
+        logger.info("working surface: %r; embedding: %s", split.surface, options.embedding)
+    with run.stage("metric"):
+        tensors = _prescribed(source, split, frame, options)
+        field = checked_field(metric_source(options, surface, tensors)(split.surface), split.surface)
+        working = split.surface
+        if field.points is not None:
+            working = working.with_points(field.points)
+            surface = split.coarse.with_points(field.points[: split.coarse.n_points])
+        field = limit_to_patches(field, working, n)
+    return Measured(options=options, frame=frame, surface=surface, split=split, tips=tips, working=working, field=field)
+
+
+def _prescribed(
+    source: PreparedInput, split: WorkingSurface, frame: Frame, options: RemeshOptions
+) -> PointTensors | None:
+    """Return the tensors at the points of the working surface (V, 3, 3) that a user prescribes, None for others."""
+    if source.tensors is not None:
+        return np.asarray(split.interpolate(source.tensors * frame.scale**2))
+    if options.size_field is None:
+        return None
+    surface = split.surface
+    if source.sizes is not None:
+        sizes = split.interpolate(source.sizes)
+    else:
+        places, function = frame.to_model(surface.points), cast(Callable[..., Any], options.size_field)
+        sizes = real_array("size_field", function(places), (len(places),), OptionError)
+        sizes = checked_sizes(sizes, places)
+    low, high = (None if bound is None else bound / frame.scale for bound in (options.min_size, options.max_size))
+    sizes = limited_sizes(surface, sizes / frame.scale, low=low, high=high, gradation=options.gradation)
+    return metric_of_sizes(sizes)
