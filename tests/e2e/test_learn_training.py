@@ -150,6 +150,14 @@ def test_a_run_of_the_paper_that_was_killed_goes_on_from_its_last_checkpoint(fil
         torch.testing.assert_close(weights(tmp_path / "cut")[name], value, rtol=0, atol=0)
 
 
+@pytest.mark.slow
+def test_weights_of_the_best_or_of_the_last_epoch_are_kept(files, tmp_path, monkeypatch):
+    monkeypatch.setattr(TrainingRun, "validate", lambda run, interruption: {"validation 0": float(run.at.epoch)})
+    for keep, epoch in (("best", 1), ("last", 3)):
+        train(options(tmp_path / keep, epochs=3, keep=keep), files)
+        assert load_weights(tmp_path / keep / WEIGHTS)[1]["epoch"] == epoch
+
+
 @pytest.mark.parametrize(("epochs", "steps"), [(600, 3), (6, 4), (4, 10)])
 def test_halved_rates_are_constant_for_a_sixth_of_the_run(epochs, steps, tmp_path):
     files = ItemFiles(training=[Path(str(k)) for k in range(2 * steps)], validation=[])

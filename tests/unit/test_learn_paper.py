@@ -354,6 +354,6 @@ def test_networks_of_an_ablation_differ_in_what_it_studies_only(suite, studied):
     for options in found.values():
         assert {name for name, value in options.items() if value != first[name]} <= studied
         assert options["network"] == asdict(PaperOptions())  # the paper's but for the channels
-        assert options["laplacian_scale"] == "paper"
+        assert (options["laplacian_scale"], options["keep"]) == ("paper", "last")
     whole = found.get("dot product", found.get("0.1, raw"))
     assert (whole["loss"], whole["laplacian"], whole["gauge"], whole["augment"]) == ("dot", 0.1, "raw", True)

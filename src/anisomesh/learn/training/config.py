@@ -18,6 +18,7 @@ _CHOICES: dict[str, tuple[str, ...]] = {
     "laplacian_scale": LAPLACIAN_SCALES,
     "gauge": ("aligned", "raw"),
     "symmetries": ("one", "all"),
+    "keep": ("best", "last"),
 }
 
 
@@ -42,6 +43,8 @@ class TrainingOptions:
         Weight decay of AdamW, and the norm that gradients are clipped to.
     noise, noise_share
         Largest standard deviation of noise on the points, in mean edge lengths, and the share of items with noise.
+    keep
+        Whether the weights that are written are of the epoch with the ``"best"`` validation or of the ``"last"``.
     seed
         Seed of the initial weights, the order of the items and the noise.
     minutes
@@ -76,6 +79,7 @@ class TrainingOptions:
     noise: float = 0.5
     noise_share: float = 0.5
     seed: int = 0
+    keep: str = "best"
     minutes: float = 5.0
     device: str = "auto"
     network: NetworkOptions | PaperOptions = field(default_factory=NetworkOptions)

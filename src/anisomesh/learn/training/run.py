@@ -202,8 +202,9 @@ class TrainingRun:
         """Validate, complete the row, and write the weights if they are the best, the rows and the checkpoint."""
         row |= {**self.validate(interruption), "seconds": round(time.monotonic() - start, 1)}
         score = sum(value for name, value in row.items() if name.startswith("validation"))
-        if score < self.at.best:
-            self.at.best = score
+        better = score < self.at.best
+        self.at.best = min(self.at.best, score)
+        if better or self.options.keep == "last":
             training = {name: value for name, value in asdict(self.options).items() if name not in _PATH_OPTIONS}
             facts = {name: row[name] for name in row if name != "seconds"} | {"training": training}
             save_weights(self.network, self.out / WEIGHTS, facts)

@@ -64,8 +64,9 @@ def train(
     -----
     It handles signals, so it must be called in the main thread. The order and noise of items depend only on the seed,
     the epoch and the step, so a checkpoint has no generator state. Checkpoints are written every few minutes, after
-    each epoch, and on SIGTERM and Ctrl-C. ``weights.safetensors`` is of the epoch with the best validation. Under
-    torchrun every process takes a share of each batch, and the first one validates and writes the files.
+    each epoch, and on SIGTERM and Ctrl-C. ``weights.safetensors`` is of the epoch with the best validation, or of the
+    last one. Under torchrun every process takes a share of each batch, and the first one validates and writes the
+    files.
     """
     out = Path(options.out)
     if not files.training or not files.validation:
