@@ -51,6 +51,8 @@ class Tasks:
         The task to make a mesh from sites.
     fit
         What that mesh is fitted to, None if it is not.
+    remarks
+        What a user should know, one sentence each.
     """
 
     options: RemeshOptions
@@ -60,6 +62,7 @@ class Tasks:
     embedding: Embedding
     dual: MeshingTask
     fit: FitTarget | None
+    remarks: tuple[str, ...]
 
 
 def set_up(source: PreparedInput, n: int, options: RemeshOptions, run: Run, *, nearest: bool) -> Tasks:
@@ -73,8 +76,12 @@ def set_up(source: PreparedInput, n: int, options: RemeshOptions, run: Run, *, n
         surface = prepared.surface.with_points(frame.to_unit(prepared.surface.points))
         options = with_embedding_chosen(options, surface)
         creases = sharp_edges(surface, min(options.feature_angle, WEAK_ANGLE))
-        split = working_surface(surface, n, creases=creases, tagged=source.tagged)
-        tips = apexes(split.coarse, sharp_edges(split.coarse, options.feature_angle))
+        creases |= source.fixed[surface.edges].any(axis=1)  # so that the points stay
+        tagged, remarks = source.features_at(n)
+        split = working_surface(surface, n, creases=creases, tagged=tagged)
+        tips = split.on_coarse(source.fixed)
+        if follows_creases(options):
+            tips |= apexes(split.coarse, sharp_edges(split.coarse, options.feature_angle))
         check_memory(n, split.surface.n_faces)
     with run.stage("metric"):
         tensors = None if source.tensors is None else split.interpolate(source.tensors * frame.scale**2)
@@ -107,6 +114,7 @@ def set_up(source: PreparedInput, n: int, options: RemeshOptions, run: Run, *, n
         embedding=embedding,
         dual=task,
         fit=target,
+        remarks=remarks,
     )
 
 
@@ -128,11 +136,10 @@ def _fit_target(
 def _features(
     embedded: EmbeddedSurface, n: int, tagged: EdgeMask, tips: PointMask, options: RemeshOptions
 ) -> FeatureNetwork:
-    """Return boundary, creases and apexes; with the plain CVT only the tagged edges.
+    """Return boundary, creases and apexes; with the plain CVT only the tagged edges and the tips.
 
-    ``tagged`` are edges (E,) of the embedded surface, and ``tips`` the apexes among its first points.
+    ``tagged`` are edges (E,) of the embedded surface, and ``tips`` apexes and fixed points among its first points.
     """
     angle = options.feature_angle if follows_creases(options) else 180.0
     sharp = sharp_edges(embedded.surface, angle) | tagged
-    apex = np.flatnonzero(tips & follows_creases(options))
-    return trace_features(embedded, n, sharp=sharp, required=tagged, apexes=apex)
+    return trace_features(embedded, n, sharp=sharp, required=tagged, apexes=np.flatnonzero(tips))
