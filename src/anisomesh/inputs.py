@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -109,7 +110,9 @@ def prepared_input(mesh: Mesh, options: RemeshOptions) -> PreparedInput:
     )
 
 
-def _tagged(prescribed: list[npt.ArrayLike], surface: Surface, prepared: Surface, options: RemeshOptions) -> EdgeMask:
+def _tagged(
+    prescribed: Sequence[npt.ArrayLike], surface: Surface, prepared: Surface, options: RemeshOptions
+) -> EdgeMask:
     """Return the edges (E,) of the prepared surface that are in any of some lists of edges of the input (n, 2)."""
     tagged = np.zeros(len(prepared.edges), dtype=bool)
     for pairs in prescribed:

@@ -12,6 +12,7 @@ from anisomesh.embedding.base import Embedding
 from anisomesh.embedding.embedder import checked_embedding
 from anisomesh.features.detect import WEAK_ANGLE, apexes, sharp_edges
 from anisomesh.features.network import FeatureNetwork, trace_features
+from anisomesh.features.smooth_lines import with_smooth_lines
 from anisomesh.fitting.fit import FitPlan
 from anisomesh.fitting.target import FitTarget
 from anisomesh.inputs import PreparedInput
@@ -26,7 +27,7 @@ from anisomesh.metric.narrow_patches import limit_to_patches
 from anisomesh.metric.thin_walls import separate_thin_walls
 from anisomesh.metric.transfer import PlacedMetric
 from anisomesh.options import RemeshOptions
-from anisomesh.resolve import embedder, fit_plan, follows_creases, metric_source, with_embedding_chosen
+from anisomesh.resolve import embedder, fit_plan, follows_creases, is_designed, metric_source, with_embedding_chosen
 from anisomesh.run import Run
 from anisomesh.voronoi.restricted import RestrictedVoronoi
 
@@ -75,9 +76,10 @@ def set_up(source: PreparedInput, n: int, options: RemeshOptions, run: Run, *, n
         frame = unit_frame(prepared.surface.points)
         surface = prepared.surface.with_points(frame.to_unit(prepared.surface.points))
         options = with_embedding_chosen(options, surface)
+        tagged, remarks = source.features_at(n)
+        surface = _with_smooth_borders(surface, source, tagged, options.feature_angle)
         creases = sharp_edges(surface, min(options.feature_angle, WEAK_ANGLE))
         creases |= source.fixed[surface.edges].any(axis=1)  # so that the points stay
-        tagged, remarks = source.features_at(n)
         split = working_surface(surface, n, creases=creases, tagged=tagged)
         tips = split.on_coarse(source.fixed)
         if follows_creases(options):
@@ -116,6 +118,19 @@ def set_up(source: PreparedInput, n: int, options: RemeshOptions, run: Run, *, n
         fit=target,
         remarks=remarks,
     )
+
+
+def _with_smooth_borders(surface: Surface, source: PreparedInput, followed: EdgeMask, crease_angle: float) -> Surface:
+    """Return a surface with smoother borders and seams among the edges (E,) that are followed, unless it is designed.
+
+    On a scan these go around triangles, which are smaller than the ones of the result.
+    """
+    lines = followed & ~source.tagged
+    if not lines.any() or is_designed(surface):
+        return surface
+    fixed = surface.on_boundary | source.fixed
+    fixed[surface.edges[source.tagged | sharp_edges(surface, crease_angle)]] = True
+    return with_smooth_lines(surface, lines, fixed)
 
 
 def _fit_target(
