@@ -77,7 +77,7 @@ def set_up(source: PreparedInput, n: int, options: RemeshOptions, run: Run, *, n
         surface = prepared.surface.with_points(frame.to_unit(prepared.surface.points))
         options = with_embedding_chosen(options, surface)
         tagged, remarks = source.features_at(n)
-        surface = _with_smooth_borders(surface, source, tagged, options.feature_angle)
+        surface, tagged = _with_smooth_borders(surface, source, tagged, options.feature_angle)
         creases = sharp_edges(surface, min(options.feature_angle, WEAK_ANGLE))
         creases |= source.fixed[surface.edges].any(axis=1)  # so that the points stay
         split = working_surface(surface, n, creases=creases, tagged=tagged)
@@ -120,17 +120,21 @@ def set_up(source: PreparedInput, n: int, options: RemeshOptions, run: Run, *, n
     )
 
 
-def _with_smooth_borders(surface: Surface, source: PreparedInput, followed: EdgeMask, crease_angle: float) -> Surface:
-    """Return a surface with smoother borders and seams among the edges (E,) that are followed, unless it is designed.
+def _with_smooth_borders(
+    surface: Surface, source: PreparedInput, followed: EdgeMask, crease_angle: float
+) -> tuple[Surface, EdgeMask]:
+    """Return a surface with smoother borders and seams among the edges (E,) that are followed, and these edges.
 
-    On a scan these go around triangles, which are smaller than the ones of the result.
+    On a scan they go around triangles, which are smaller than the ones of the result; designed surfaces stay.
     """
     lines = followed & ~source.tagged
     if not lines.any() or is_designed(surface):
-        return surface
+        return surface, followed
+    creases = sharp_edges(surface, crease_angle)
     fixed = surface.on_boundary | source.fixed
-    fixed[surface.edges[source.tagged | sharp_edges(surface, crease_angle)]] = True
-    return with_smooth_lines(surface, lines, fixed)
+    fixed[surface.edges[source.tagged | creases]] = True
+    surface, (lines, tagged, _) = with_smooth_lines(surface, lines, (source.tagged, creases), fixed)
+    return surface, lines | tagged
 
 
 def _fit_target(
