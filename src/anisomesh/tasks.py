@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -21,7 +21,7 @@ from anisomesh.mesh.closest_points import ClosestPoints
 from anisomesh.mesh.embedded_surface import EmbeddedSurface
 from anisomesh.mesh.geometry import Frame, unit_frame
 from anisomesh.mesh.surface import Surface
-from anisomesh.mesh.working_surface import working_surface
+from anisomesh.mesh.working_surface import WorkingSurface, working_surface
 from anisomesh.metric.field import MetricField, checked_field
 from anisomesh.metric.narrow_patches import limit_to_patches
 from anisomesh.metric.thin_walls import separate_thin_walls
@@ -107,7 +107,8 @@ def set_up(source: PreparedInput, n: int, options: RemeshOptions, run: Run, *, n
             deadline=run.deadline,
         )
         plan = fit_plan(options, surface, nearest=nearest)
-        target = None if plan is None else _fit_target(task, working, field, plan, options.feature_angle)
+        metric, prescribed = PlacedMetric(ClosestPoints(working), field), bool(source.tagged.any())
+        target = None if plan is None else _fit_target(task, split, metric, plan, options, prescribed=prescribed)
     return Tasks(
         options=options,
         frame=frame,
@@ -138,18 +139,28 @@ def _with_smooth_borders(
 
 
 def _fit_target(
-    task: MeshingTask, working: Surface, field: MetricField, plan: FitPlan, crease_angle: float
+    task: MeshingTask,
+    split: WorkingSurface,
+    metric: PlacedMetric,
+    plan: FitPlan,
+    options: RemeshOptions,
+    *,
+    prescribed: bool,
 ) -> FitTarget:
-    """Return what meshes are fitted to; the field is on the working surface."""
-    return FitTarget.of(
+    """Return what meshes are fitted to.
+
+    If edges are ``prescribed`` by a user all creases are held, else only borders and seams.
+    """
+    target = FitTarget.of(
         task.reference,
-        PlacedMetric(ClosestPoints(working), field),
+        metric,
         task.n_vertices,
         corners=task.corner_places,
-        holds_creases=bool(task.features.required.any()),
-        crease_angle=crease_angle,
+        holds_creases=prescribed and bool(task.features.required.any()),
+        crease_angle=options.feature_angle,
         plan=plan,
     )
+    return replace(target, lines=split.coarse.edges[split.coarse_tagged].astype(np.int64))
 
 
 def _features(
