@@ -120,7 +120,9 @@ class Divided:
         facet, weights = np.zeros(len(points), dtype=np.int64), np.zeros((len(points), 3))
         order = np.argsort(parts, kind="stable")
         numbers, first = np.unique(parts[order], return_index=True)
-        for number, rows in zip(numbers.tolist(), np.split(order, first[1:]), strict=True):
+        ends = np.append(first, len(order))[1:]
+        for number, start, end in zip(numbers.tolist(), first, ends, strict=True):
+            rows = order[start:end]
             facet[rows], weights[rows] = self._part(number).locate(points[rows], normals[rows], reach[rows])
         return facet, weights
 
