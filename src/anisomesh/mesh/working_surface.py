@@ -45,10 +45,8 @@ class WorkingSurface:
         The surface; its first points are the points of ``coarse``, unchanged.
     tagged
         Which of its edges (E',) are parts of tagged edges.
-    coarse
-        The input without short edges; the input itself if it has none.
-    coarse_tagged
-        Which of its edges (E'',) are parts of tagged edges.
+    coarse, coarse_tagged
+        The input without short edges, itself if it has none, and which of its edges (E'',) are parts of tagged edges.
     """
 
     surface: Surface
