@@ -19,8 +19,8 @@ import numpy as np
 
 from anisomesh.bench.inputs import make_shape
 from anisomesh.embedding.direct import embed
+from anisomesh.execution.isolation import isolated
 from anisomesh.io.meshes import load
-from anisomesh.isolation import isolated
 from anisomesh.learn.inference.predict import predict
 from anisomesh.mesh.geometry import unit_frame
 from anisomesh.mesh.surface import Surface

@@ -25,6 +25,7 @@ if TYPE_CHECKING:
     from anisomesh.embedding.precomputed import precomputed_embedding
     from anisomesh.errors import AnisomeshError, MeshError, MeshFileError, MetricError, OptionError
     from anisomesh.evaluation.report import Evaluation, evaluate
+    from anisomesh.execution.progress import StepInfo
     from anisomesh.features.network import trace_features
     from anisomesh.io.meshes import load, save
     from anisomesh.learn.inference.source import Hybrid, Neural
@@ -34,7 +35,6 @@ if TYPE_CHECKING:
     from anisomesh.metric.sources import Approximation, Curvature, Uniform
     from anisomesh.options import RemeshOptions
     from anisomesh.pipeline import remesh
-    from anisomesh.progress import StepInfo
     from anisomesh.repair.prepare import prepare
     from anisomesh.result import RemeshResult, save_rvd
     from anisomesh.shapes.analytic import sample
@@ -48,7 +48,7 @@ _MODULE_OF = {
     "remesh": "pipeline",
     "RemeshOptions": "options",
     "RemeshResult": "result",
-    "StepInfo": "progress",
+    "StepInfo": "execution.progress",
     # meshes in and out, judged and drawn
     "Surface": "mesh.surface",
     "Mesh": "attributes.model",

@@ -84,7 +84,7 @@ class RemeshOptions:
     embedding_iterations
         Bound on the local/global steps of the direct embedding.
     weld_tolerance
-        Points of the input up to this distance (model units) are merged.
+        Points of the input up to this distance (model units) are merged; ``"auto"`` is 1e-5 of the diagonal.
     feature_angle
         Edges of the input whose dihedral angle deviates from flat by more degrees than this are creases, which edges of
         the result follow where there are enough vertices, and across which no curvature is measured; 180 for none. The
@@ -117,7 +117,7 @@ class RemeshOptions:
     lloyd_iterations: int = 9
     max_iterations: int | None = None
     embedding_iterations: int = 10
-    weld_tolerance: float = 0.0
+    weld_tolerance: float | Literal["auto"] = 0.0
     feature_angle: float = 40.0
     features: npt.ArrayLike | None = None
     regions: bool = True
@@ -132,8 +132,8 @@ class RemeshOptions:
                 raise OptionError(f"{name} = {value}; expected a finite number of at least 1 (1 is the plain CVT)")
         if not 0.0 <= self.feature_angle <= 180.0:
             raise OptionError(f"feature_angle = {self.feature_angle}; expected 0 to 180 degrees")
-        if not (self.weld_tolerance >= 0.0 and math.isfinite(self.weld_tolerance)):
-            raise OptionError(f"weld_tolerance = {self.weld_tolerance}; expected a length of at least 0")
+        if self.weld_tolerance != "auto" and not (self.weld_tolerance >= 0.0 and math.isfinite(self.weld_tolerance)):
+            raise OptionError(f"weld_tolerance = {self.weld_tolerance}; expected a length of at least 0, or 'auto'")
         if not (self.shape_weight > 0.0 and math.isfinite(self.shape_weight)):
             raise OptionError(f"shape_weight = {self.shape_weight}; expected a positive number, such as 4 or 0.25")
         if self.time_limit is not None and not self.time_limit > 0.0:
@@ -151,7 +151,8 @@ class RemeshOptions:
         """Turn numbers of any type, such as NumPy's, into Python's."""
         for name in (*_NUMBERS, *_OPTIONAL_NUMBERS):
             value = getattr(self, name)
-            if not (value is None and name in _OPTIONAL_NUMBERS):
+            is_word = isinstance(value, str) and (name, value) == ("weld_tolerance", "auto")
+            if not (is_word or (value is None and name in _OPTIONAL_NUMBERS)):
                 object.__setattr__(self, name, real_number(name, value))
         for name, low in _LEAST.items():
             if name == "max_iterations" and self.max_iterations is None:

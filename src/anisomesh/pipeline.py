@@ -12,11 +12,13 @@ from anisomesh.attributes.transfer import oriented_as, transfer_attributes
 from anisomesh.caveats import caveats, losses_of_attributes, losses_of_repair, losses_of_shape
 from anisomesh.cvt.lbfgs import Optimised
 from anisomesh.cvt.schedule import DualFeedback, optimise_sites
-from anisomesh.deadline import Deadline
 from anisomesh.delaunay.creases import missing_on_creases
 from anisomesh.delaunay.dual import dual_squared_errors
 from anisomesh.delaunay.meshing import MeshingTask, ValidMesh, mesh_from_sites
 from anisomesh.errors import OptionError
+from anisomesh.execution.deadline import Deadline
+from anisomesh.execution.progress import OnStep, StepInfo, ignore_steps
+from anisomesh.execution.run import OPTIMISATION_SHARE, Run
 from anisomesh.features.tagged import distance_to_crease_edges
 from anisomesh.fitting.target import FitTarget
 from anisomesh.fitting.valid import fit_without_faults
@@ -25,13 +27,11 @@ from anisomesh.io.convert import as_surface
 from anisomesh.mesh.surface import Surface
 from anisomesh.mesh.validity import Validity, check_validity
 from anisomesh.options import MIN_VERTICES, RemeshOptions, read_target, with_overrides
-from anisomesh.progress import OnStep, StepInfo, ignore_steps
 from anisomesh.resolve import (
     cvt_options,
     embedding_name,
 )
 from anisomesh.result import RemeshResult
-from anisomesh.run import OPTIMISATION_SHARE, Run
 from anisomesh.search import smallest_within
 from anisomesh.tasks import set_up
 from anisomesh.voronoi.restricted import RestrictedVoronoi
@@ -55,8 +55,8 @@ def remesh(
     Parameters
     ----------
     mesh
-        Points (V, 3) together with ``faces``, or a :class:`Surface`, a ``trimesh.Trimesh`` or a
-        ``pyvista.PolyData`` of triangles; or a :class:`Mesh`, of which the result has everything in its ``mesh``.
+        Points (V, 3) together with ``faces``, or what :func:`~anisomesh.io.convert.as_surface` takes, or a
+        :class:`Mesh`, of which the result has everything in its ``mesh``.
     faces
         Triangles (F, 3), if the first argument is an array of points.
     n_vertices

@@ -6,8 +6,8 @@ from collections.abc import Callable
 from dataclasses import dataclass, replace
 from math import exp, log
 
-from anisomesh.deadline import Deadline
 from anisomesh.errors import OptionError, TimeLimitError
+from anisomesh.execution.deadline import Deadline
 from anisomesh.mesh.distance import hausdorff_distance
 from anisomesh.mesh.surface import Surface
 from anisomesh.options import MIN_VERTICES

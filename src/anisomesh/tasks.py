@@ -10,13 +10,14 @@ from anisomesh._arrays import EdgeMask, PointMask
 from anisomesh.delaunay.meshing import MeshingTask
 from anisomesh.embedding.base import Embedding
 from anisomesh.embedding.embedder import checked_embedding
+from anisomesh.execution.memory import check_memory
+from anisomesh.execution.run import Run
 from anisomesh.features.detect import WEAK_ANGLE, apexes, sharp_edges
 from anisomesh.features.network import FeatureNetwork, trace_features
 from anisomesh.features.smooth_lines import with_smooth_lines
 from anisomesh.fitting.fit import FitPlan
 from anisomesh.fitting.target import FitTarget
 from anisomesh.inputs import PreparedInput
-from anisomesh.memory import check_memory
 from anisomesh.mesh.closest_points import ClosestPoints
 from anisomesh.mesh.embedded_surface import EmbeddedSurface
 from anisomesh.mesh.geometry import Frame, unit_frame
@@ -28,7 +29,6 @@ from anisomesh.metric.thin_walls import separate_thin_walls
 from anisomesh.metric.transfer import PlacedMetric
 from anisomesh.options import RemeshOptions
 from anisomesh.resolve import embedder, fit_plan, follows_creases, is_designed, metric_source, with_embedding_chosen
-from anisomesh.run import Run
 from anisomesh.voronoi.restricted import RestrictedVoronoi
 
 

@@ -10,8 +10,8 @@ import trimesh
 from edge_distance import distance_to_edges
 
 import anisomesh
-from anisomesh.deadline import Deadline
 from anisomesh.errors import AnisomeshError, OptionError, TimeLimitError
+from anisomesh.execution.deadline import Deadline
 from anisomesh.features.detect import points_along
 from anisomesh.mesh import topology
 from anisomesh.mesh.distance import hausdorff_distance, surface_distance
@@ -188,7 +188,7 @@ def test_invalid_lengths_are_refused(run_cli, tmp_path, torus_obj, text):
 
 def test_a_time_limit_ends_the_optimisation_and_says_so(monkeypatch):
     now = 0.0
-    monkeypatch.setattr("anisomesh.deadline.time", SimpleNamespace(perf_counter=lambda: now))
+    monkeypatch.setattr("anisomesh.execution.deadline.time", SimpleNamespace(perf_counter=lambda: now))
 
     def tick(step):
         nonlocal now

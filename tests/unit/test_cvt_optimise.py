@@ -1,11 +1,10 @@
 """Lloyd's algorithm and L-BFGS: direction, descent, convergence."""
 
-from collections import deque
-
 import naive_rvd as naive
 import numpy as np
 import pytest
 
+import anisomesh
 from anisomesh.cvt import lbfgs
 from anisomesh.cvt.energy import NormalMetric
 from anisomesh.cvt.lbfgs import DescentOptions, Status
@@ -50,28 +49,28 @@ def test_direction_matches_the_dense_recursion(n_pairs, with_blocks):
     if n_pairs:
         change = hessian @ steps[-1]
         inverse *= (change @ steps[-1]) / (change @ inverse @ change)
-    pairs = deque()
+    learnt = lbfgs._InverseHessian(n_pairs, blocks)
     for step in steps:
         change = hessian @ step
         rho = 1.0 / (change @ step)
         left = np.eye(n * d) - rho * np.outer(step, change)
         inverse = left @ inverse @ left.T + rho * np.outer(step, step)
-        pairs.append((step.reshape(n, d), change.reshape(n, d), rho))
+        learnt.learn(step.reshape(n, d), change.reshape(n, d))
     gradient = rng.normal(size=(n, d))
-    direction = lbfgs._direction(fake(gradient, mass), pairs, blocks)
+    direction, slope = learnt.descent(fake(gradient, mass))
+    assert slope == pytest.approx(float((gradient * direction).sum()))
     np.testing.assert_allclose(direction.ravel(), -inverse @ gradient.ravel(), rtol=1e-10, atol=1e-12)
     if n_pairs:
         # secant equation: the last change of the gradient is mapped to the last step
-        last = lbfgs._direction(fake(pairs[-1][1], mass), pairs, blocks)
-        np.testing.assert_allclose(last, -pairs[-1][0], rtol=1e-9, atol=1e-10)
+        last, _ = learnt.descent(fake((hessian @ steps[-1]).reshape(n, d), mass))
+        np.testing.assert_allclose(last.ravel(), -steps[-1], rtol=1e-9, atol=1e-10)
 
 
 def test_direction_without_pairs_is_lloyds_step():
     voronoi, sites = start()
     value = voronoi.integrate(sites, 1.0)
-    np.testing.assert_allclose(
-        sites + lbfgs._direction(value, deque(), None), lloyd(voronoi, sites, 1), rtol=0, atol=1e-14
-    )
+    direction, _ = lbfgs._InverseHessian(5, None).descent(value)
+    np.testing.assert_allclose(sites + direction, lloyd(voronoi, sites, 1), rtol=0, atol=1e-14)
 
 
 def test_sites_with_empty_cells_stay():
@@ -219,3 +218,37 @@ def test_blocks_lower_the_energy_faster(monkeypatch):
     with_blocks = minimise(voronoi, sites, 7.0, max_iterations=20).energy
     monkeypatch.setattr(NormalMetric, "inverse_blocks", lambda *given: None)
     assert with_blocks < minimise(voronoi, sites, 7.0, max_iterations=20).energy
+
+
+class Plain:
+    """The energy of the paper without its blocks."""
+
+    def evaluate(self, voronoi, sites):
+        return NormalMetric(7.0).evaluate(voronoi, sites)
+
+
+class WithBlocks(Plain):
+    def __init__(self, blocks):
+        self.blocks = blocks
+
+    def inverse_blocks(self, voronoi, sites):
+        return self.blocks(len(sites))
+
+
+def test_blocks_of_an_own_energy_are_used():
+    options = DescentOptions(max_iterations=3)
+    voronoi, sites = start()
+    plain = lbfgs.minimise(voronoi, sites, Plain(), options=options)
+    unit = lbfgs.minimise(voronoi, sites, WithBlocks(lambda n: np.tile(np.eye(3), (n, 1, 1))), options=options)
+    flat = lbfgs.minimise(
+        voronoi, sites, WithBlocks(lambda n: np.tile(np.diag([0.5, 1.0, 2.0]), (n, 1, 1))), options=options
+    )
+    np.testing.assert_allclose(unit.sites, plain.sites, rtol=0, atol=1e-12)
+    assert not np.allclose(flat.sites, plain.sites, rtol=0, atol=1e-6)
+
+
+@pytest.mark.parametrize("blocks", [lambda n: np.ones((n, 3)), lambda n: np.full((n, 3, 3), np.nan)])
+def test_wrong_blocks_are_refused(blocks):
+    voronoi, sites = start()
+    with pytest.raises(anisomesh.OptionError, match="inverse_blocks"):
+        lbfgs.minimise(voronoi, sites, WithBlocks(blocks), options=DescentOptions(max_iterations=1))

@@ -6,7 +6,7 @@ import os
 import pytest
 
 from anisomesh.errors import AnisomeshError
-from anisomesh.isolation import isolated
+from anisomesh.execution.isolation import isolated
 
 
 def test_result_and_error_come_back():

@@ -5,7 +5,7 @@ import time
 
 import pytest
 
-from anisomesh.threads import Workers
+from anisomesh.execution.threads import Workers
 
 
 @pytest.mark.parametrize("threads", [1, 2, 5])

@@ -5,7 +5,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from anisomesh.threads import Workers
+from anisomesh.execution.threads import Workers
 from anisomesh.voronoi.neighbour_lists import NeighbourLists
 from conftest import examples
 

@@ -18,7 +18,7 @@ _OPPOSED_COSINE = -0.1  # between normals of point and face, below which another
 _AGREEING_COSINE = 0.1  # from which on the other sheet faces the way of the point; heuristic
 _MAX_STEPS = 300  # faces that a walk crosses
 _OUTSIDE = 1e-12  # barycentric coordinate below which a walk goes on: rounding
-_FLAT = 1e-30  # squared sine of a corner of a face that has no plane
+_FLAT_SINE_SQUARED = 1e-30  # squared sine of a corner of a face that has no plane
 
 Floats = npt.NDArray[np.float64]
 Mask = npt.NDArray[np.bool_]
@@ -214,7 +214,7 @@ def _projected(corners: Floats, points: Points) -> Floats:
     square = np.einsum("nx,nx->n", normal, normal)
     offset = points - corners[:, 0]
     lengths = np.einsum("nx,nx->n", first, first) * np.einsum("nx,nx->n", second, second)
-    flat = ~(square > _FLAT * lengths)
+    flat = ~(square > _FLAT_SINE_SQUARED * lengths)
     square = np.where(flat, 1.0, square)
     b = np.einsum("nx,nx->n", np.cross(offset, second), normal) / square
     c = np.einsum("nx,nx->n", np.cross(first, offset), normal) / square

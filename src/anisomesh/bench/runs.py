@@ -19,8 +19,8 @@ from anisomesh.bench.suite import Suite, SuiteMethod
 from anisomesh.bench.training import train_networks
 from anisomesh.errors import AnisomeshError
 from anisomesh.evaluation.report import evaluate
+from anisomesh.execution.isolation import isolated
 from anisomesh.io.atomic import append_line, drop_cut_line
-from anisomesh.isolation import isolated
 from anisomesh.mesh.surface import Surface
 from anisomesh.options import MIN_VERTICES
 from anisomesh.repair.prepare import prepare

@@ -174,10 +174,13 @@ class Length:
         return self.value / 100.0 * surface.diagonal if self.relative else self.value
 
 
-Source = Annotated[Path, typer.Argument(metavar="IN", help="Mesh to remesh: OBJ, OFF, PLY, STL, GLB, VTU, ...")]
+Source = Annotated[Path, typer.Argument(metavar="IN", help="Mesh to remesh: OBJ, OFF, PLY, STL, GLB, 3MF, VTU, ...")]
 Vertices = Annotated[int | None, typer.Option("--vertices", "-n", min=4, help="Number of vertices of the result.")]
 Ratio = Annotated[
     float | None,
     typer.Option("--ratio", callback=positive, help="Vertices of the result per vertex of the repaired input."),
+]
+InputFormat = Annotated[
+    str | None, typer.Option(metavar="FORMAT", help="Format of IN, if its suffix does not name it: ply, obj, ...")
 ]
 Quiet = Annotated[bool, typer.Option("--quiet", "-q", help="No progress and no summary.")]

@@ -7,19 +7,22 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from anisomesh.cli.job import read
-from anisomesh.cli.report import as_json, counted, describe_validity, table
+from anisomesh.cli.arguments import InputFormat
+from anisomesh.cli.job import check_input_format, read
+from anisomesh.cli.report import as_json, counted, describe_validity, hints, table
 
 if TYPE_CHECKING:
     from anisomesh.mesh.surface import Surface
 
 
 def command(
-    source: Annotated[Path, typer.Argument(metavar="IN", help="Mesh file: OBJ, OFF, PLY, STL, GLB, VTU, ...")],
+    source: Annotated[Path, typer.Argument(metavar="IN", help="Mesh file: OBJ, OFF, PLY, STL, GLB, 3MF, VTU, ...")],
+    input_format: InputFormat = None,
     json_: Annotated[bool, typer.Option("--json", help="Print the facts as JSON and nothing else.")] = False,
 ) -> None:
-    """Describe a mesh: size, topology, defects, and the repairs before a remesh."""
-    facts = describe(read(source)[0]) | {"file": str(source)}
+    """Describe a mesh: size, topology, defects, and the repairs before a remesh; - is standard input."""
+    check_input_format(source, input_format)
+    facts = describe(read(source, input_format)[0]) | {"file": str(source)}
     typer.echo(as_json(facts) if json_ else _text(facts))
 
 
@@ -51,6 +54,7 @@ def describe(surface: Surface) -> dict[str, Any]:
             "points": prepared.surface.n_points,
             "faces": prepared.surface.n_faces,
         },
+        "hints": hints(prepared.surface),
     }
 
 
@@ -95,4 +99,5 @@ def _text(facts: dict[str, Any]) -> str:
     if prepare["changes"]:
         size = f"{counted(prepare['points'], 'point')}, {counted(prepare['faces'], 'face')}"
         rows.append(("prepared", size))
+    rows += [("hint", hint) for hint in facts["hints"]]
     return f"{facts['file']}\n{table(rows)}"

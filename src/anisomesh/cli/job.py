@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import sys
 import tempfile
 import time
 from dataclasses import dataclass
@@ -18,19 +19,35 @@ if TYPE_CHECKING:
     from anisomesh.result import RemeshResult
 
 
+STANDARD_STREAM = Path("-")
+"""Stands for standard input and standard output in place of a file."""
+
+
 @dataclass(frozen=True, kw_only=True)
 class Outputs:
-    """The files that a remesh writes; None for each file that was not requested."""
+    """The files that a remesh writes; None for each file that was not requested.
+
+    Attributes
+    ----------
+    mesh
+        The result; :data:`STANDARD_STREAM` for standard output.
+    mesh_format
+        Its format, if the suffix does not name it.
+    report, rvd, picture
+        The others.
+    """
 
     mesh: Path
+    mesh_format: str | None = None
     report: Path | None = None
     rvd: Path | None = None
     picture: Path | None = None
 
     @property
     def paths(self) -> list[Path]:
-        """The requested files, in the order of writing."""
-        return [path for path in (self.mesh, self.report, self.rvd, self.picture) if path is not None]
+        """The requested files, in the order of writing, without standard output."""
+        paths = (self.mesh, self.report, self.rvd, self.picture)
+        return [path for path in paths if path not in (None, STANDARD_STREAM)]
 
     def check(self, *inputs: Path | None) -> None:
         """Check before a long computation that every file can be written and none replaces an input by accident.
@@ -47,17 +64,21 @@ class Outputs:
         AnisomeshError
             If a picture was requested and nothing can be drawn on this machine.
         """
+        for option, path in (("--report", self.report), ("--rvd", self.rvd), ("--picture", self.picture)):
+            if path == STANDARD_STREAM:
+                raise typer.BadParameter(f"{option} -: only the mesh goes to standard output; give the name of a file")
         for path in self.paths:
             check_output_path(path)
         if len({path.resolve() for path in self.paths}) < len(self.paths):
             raise typer.BadParameter("two outputs have the same file name; give each its own")
         for path in self.paths:
             refuse_to_overwrite(path, *(inputs[1:] if path is self.mesh else inputs))
-        from anisomesh.io.meshes import MESH_FORMATS
-
-        if self.mesh.suffix.lower() not in MESH_FORMATS:
-            expected = ", ".join(sorted(MESH_FORMATS))
-            raise typer.BadParameter(f"{self.mesh}: expected a file name ending in one of {expected}")
+        if self.mesh_format is not None:
+            check_format(self.mesh_format, "--output-format")
+        elif self.mesh == STANDARD_STREAM:
+            raise typer.BadParameter("-o -: give --output-format, such as ply")
+        else:
+            check_format(self.mesh.suffix, str(self.mesh))
         if self.rvd is not None and self.rvd.suffix.lower() not in (".vtu", ".obj"):
             raise typer.BadParameter(f"--rvd {self.rvd}: expected a file name ending in .vtu or .obj")
         if self.picture is not None:
@@ -67,8 +88,10 @@ class Outputs:
         """Write the files, each to a temporary file that is renamed when it is complete."""
         from anisomesh.io.meshes import save
 
-        display.note(f"writing {', '.join(str(path) for path in self.paths)}")
-        save(result.surface, self.mesh)
+        if self.paths:
+            display.note(f"writing {', '.join(str(path) for path in self.paths)}")
+        if self.mesh != STANDARD_STREAM:
+            save(result.surface, self.mesh, file_format=self.mesh_format)
         if self.report is not None:
             write_json(facts, self.report)
         if self.rvd is not None:
@@ -79,6 +102,19 @@ class Outputs:
             from anisomesh.viz import side_by_side
 
             side_by_side(result.prepared, result.surface, self.picture)
+        if self.mesh == STANDARD_STREAM:
+            save(result.surface, sys.stdout.buffer, file_format=self.mesh_format)
+
+
+def check_format(name: str, where: str) -> None:
+    """Raise typer.BadParameter if a name, such as ply or .ply, is not a mesh format; ``where`` begins the message."""
+    from anisomesh.io.meshes import MESH_FORMATS
+
+    if "." + name.lower().removeprefix(".") not in MESH_FORMATS:
+        expected = ", ".join(sorted(MESH_FORMATS))
+        if where.startswith("--"):
+            raise typer.BadParameter(f"{where} {name}: expected one of {expected}")
+        raise typer.BadParameter(f"{where}: expected a file name ending in one of {expected}")
 
 
 def check_output_path(path: Path) -> None:
@@ -135,13 +171,30 @@ def check_picture_path(path: Path, option: str) -> None:
     require_renderer()
 
 
-def read(path: Path) -> tuple[Surface, float]:
-    """Read a mesh file and return the mesh and the time in seconds."""
+def read(path: Path, file_format: str | None = None) -> tuple[Surface, float]:
+    """Read a mesh file, or standard input, and return the mesh and the time in seconds.
+
+    Parameters
+    ----------
+    path
+        The file; :data:`STANDARD_STREAM` together with a format for standard input.
+    file_format
+        The format, if the suffix does not name it.
+    """
     from anisomesh.io.meshes import load
 
     start = time.perf_counter()
-    surface = load(path)
+    is_stream = path == STANDARD_STREAM and file_format is not None
+    surface = load(sys.stdin.buffer if is_stream else path, file_format=file_format)
     return surface, time.perf_counter() - start
+
+
+def check_input_format(path: Path, file_format: str | None) -> None:
+    """Raise typer.BadParameter if a format is unknown, or none is given for standard input."""
+    if file_format is not None:
+        check_format(file_format, "--input-format")
+    elif path == STANDARD_STREAM:
+        raise typer.BadParameter("-: give --input-format, such as ply")
 
 
 def run_remesh(

@@ -9,7 +9,7 @@ from types import TracebackType
 from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
-    from anisomesh.progress import StepInfo
+    from anisomesh.execution.progress import StepInfo
 
 _STAGE_LABELS = {
     "prepare": "preparing the mesh",
@@ -117,7 +117,7 @@ def progress(quiet: bool) -> Display:
     Returns
     -------
     context manager
-        Call it with a :class:`~anisomesh.progress.StepInfo` for every step; ``note(text)`` prints a remark.
+        Call it with a :class:`~anisomesh.execution.progress.StepInfo` for every step; ``note(text)`` prints a remark.
     """
     if quiet:
         return Display()

@@ -10,6 +10,8 @@ from typing import TYPE_CHECKING, Any
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
+    from anisomesh.mesh.surface import Surface
+
 _METRIC_SOURCES = {
     "direct": "direct (metric of the measured curvature)",
     "neural": "neural (metric predicted by a network)",
@@ -52,6 +54,15 @@ def table(rows: Sequence[tuple[str, str]]) -> str:
     return "\n".join(f"  {name:<{width}}  {text}" for name, text in rows)
 
 
+def hints(prepared: Surface) -> list[str]:
+    """Return advice on a surface as it is before the remesh, a line each."""
+    from anisomesh.repair.near_points import count_near_boundary_points
+
+    near = count_near_boundary_points(prepared)
+    advice = "boundary points lie within 1e-5 of the diagonal of others; --weld auto joins them"
+    return [f"{near:,} {advice}"] if near else []
+
+
 def summary(report: dict[str, Any], written: Sequence[Path], notes: Sequence[str]) -> str:
     """Return the readable summary of a remesh.
 
@@ -81,6 +92,7 @@ def summary(report: dict[str, Any], written: Sequence[Path], notes: Sequence[str
         ("seconds", f"{seconds['total']:.2f} ({stages})"),
         *(("prepared", note) for note in notes),
         *(("warning", text) for text in report["warnings"]),
+        *(("hint", text) for text in report.get("hints", [])),
         *(("wrote", str(path)) for path in written),
     ]
     return table(rows)

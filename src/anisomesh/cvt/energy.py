@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Any, Protocol
+from typing import Any, Protocol, runtime_checkable
 
 import numpy as np
 import numpy.typing as npt
@@ -22,6 +22,18 @@ class Energy(Protocol):
 
     def evaluate(self, voronoi: RestrictedVoronoi, sites: Sites, /) -> EnergyValue:
         """Return the energy of sites (S, d), its gradient, and mass and energy of each cell."""
+        ...
+
+
+@runtime_checkable
+class PreconditionedEnergy(Energy, Protocol):
+    """An energy that knows roughly how stiff it is in space around each site, which saves iterations."""
+
+    def inverse_blocks(self, voronoi: RestrictedVoronoi, sites: Sites, /) -> PointTensors | None:
+        """Return symmetric positive definite matrices (S, 3, 3), or None for unit matrices.
+
+        They stand for the inverse of the Hessian by each site in space, over twice the mass of its cell.
+        """
         ...
 
 
@@ -44,6 +56,18 @@ def evaluate_energy(energy: Energy, voronoi: RestrictedVoronoi, sites: Sites) ->
     if n and mass.min() < 0.0:
         raise OptionError(f"mass[{np.argmin(mass)}] of the energy is {mass.min():g}; expected no negative mass")
     return EnergyValue(value=float(value), gradient=gradient, mass=mass, per_cell=per_cell)
+
+
+def inverse_blocks(energy: Energy, voronoi: RestrictedVoronoi, sites: Sites) -> PointTensors | None:
+    """Return the blocks (S, 3, 3) of an energy for sites (S, d) after validation, None if it has none.
+
+    Raises
+    ------
+    OptionError
+        If the shape is wrong, or a number is not finite or not real.
+    """
+    blocks = energy.inverse_blocks(voronoi, sites) if isinstance(energy, PreconditionedEnergy) else None
+    return None if blocks is None else _finite("inverse_blocks", blocks, (len(sites), 3, 3))
 
 
 def _finite(name: str, values: Any, shape: tuple[int, ...]) -> npt.NDArray[np.float64]:
@@ -85,7 +109,7 @@ class NormalMetric:
         """Return the energy of sites (S, d), its gradient, and mass and energy of each cell."""
         return voronoi.integrate(sites, self.sharpness)
 
-    def inverse_blocks(self, voronoi: RestrictedVoronoi, sites: Sites) -> PointTensors | None:
+    def inverse_blocks(self, voronoi: RestrictedVoronoi, sites: Sites, /) -> PointTensors | None:
         """Return approximately the inverse of the Hessian over twice the mass of each cell, in space (S, 3, 3).
 
         Returns

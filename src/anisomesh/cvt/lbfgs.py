@@ -11,9 +11,9 @@ import numpy as np
 import numpy.typing as npt
 
 from anisomesh._arrays import PointTensors, Sites
-from anisomesh.cvt.energy import Energy, NormalMetric, evaluate_energy
+from anisomesh.cvt.energy import Energy, evaluate_energy, inverse_blocks
 from anisomesh.cvt.lloyd import OnIteration, divide_rows
-from anisomesh.deadline import NO_DEADLINE, Deadline
+from anisomesh.execution.deadline import NO_DEADLINE, Deadline
 from anisomesh.voronoi.restricted import EnergyValue, RestrictedVoronoi
 
 _ARMIJO = 1e-4  # share of the expected decrease that a step must reach; Nocedal and Wright, section 3.1
@@ -109,8 +109,8 @@ def minimise(
     Notes
     -----
     Two-loop recursion with the inverse of twice the masses as initial matrix, scaled as usual by the last pair: for the
-    plain CVT and no pairs the step is Lloyd's. With the normal metric each site has a block more, which saves
-    iterations (:meth:`~anisomesh.cvt.energy.NormalMetric.inverse_blocks`). The line search accepts the weak Wolfe
+    plain CVT and no pairs the step is Lloyd's. With a :class:`~anisomesh.cvt.energy.PreconditionedEnergy` each site has
+    a block more, which saves iterations. The line search accepts the weak Wolfe
     conditions by bisection (Lewis and Overton 2013), from step 1. All sums are NumPy's own, so the result does not
     depend on a threaded BLAS.
 
@@ -130,13 +130,8 @@ def minimise(
         return value
 
     here = evaluate(sites)
-    evaluations = 1
-    blocks = (
-        energy.inverse_blocks(voronoi, sites) if isinstance(energy, NormalMetric) and options.max_iterations else None
-    )
-    pairs: deque[tuple[Sites, Sites, float]] = deque(maxlen=options.memory)
-    status = Status.ITERATION_LIMIT
-    iteration = 0
+    evaluations, iteration, status = 1, 0, Status.ITERATION_LIMIT
+    inverse = _InverseHessian(options.memory, inverse_blocks(energy, voronoi, sites))
     while iteration < options.max_iterations:
         if _relative_gradient(here) < options.tolerance:
             status = Status.CONVERGED
@@ -144,31 +139,72 @@ def minimise(
         if deadline.passed():
             status = Status.TIME_LIMIT
             break
-        direction = _direction(here, pairs, blocks)
-        slope = _dot(here.gradient, direction)
-        if slope >= 0.0:
-            pairs.clear()
-            direction = _direction(here, pairs, blocks)
-            slope = _dot(here.gradient, direction)
+        direction, slope = inverse.descent(here)
         step, there, trials = _line_search(evaluate, sites, here, direction, slope)
         evaluations += trials
         if there is None:
-            if not pairs:
+            if not inverse.forget():
                 status = Status.NO_DESCENT
                 break
-            pairs.clear()
             continue
-        moved = step * direction
-        change = there.gradient - here.gradient
-        curvature = _dot(moved, change)
-        if curvature > 0.0:
-            pairs.append((moved, change, 1.0 / curvature))
-        sites = sites + moved
-        here = there
-        iteration += 1
+        inverse.learn(step * direction, there.gradient - here.gradient)
+        sites, here, iteration = sites + step * direction, there, iteration + 1
         if on_iteration is not None:
             on_iteration(iteration, here.value)
     return Optimised(sites=sites, energy=here.value, iterations=iteration, evaluations=evaluations, status=status)
+
+
+class _InverseHessian:
+    """The inverse Hessian of an energy as L-BFGS knows it: an initial matrix, and pairs of steps and their effects."""
+
+    def __init__(self, memory: int, blocks: PointTensors | None) -> None:
+        self._pairs: deque[tuple[Sites, Sites, float]] = deque(maxlen=memory)
+        self._blocks = blocks
+
+    def learn(self, moved: Sites, change: Sites) -> None:
+        """Remember a step and the change of the gradient, unless the energy is concave along it."""
+        curvature = _dot(moved, change)
+        if curvature > 0.0:
+            self._pairs.append((moved, change, 1.0 / curvature))
+
+    def forget(self) -> bool:
+        """Forget all steps, and return whether there were any."""
+        known = bool(self._pairs)
+        self._pairs.clear()
+        return known
+
+    def descent(self, here: EnergyValue) -> tuple[Sites, float]:
+        """Return a direction of descent and the slope along it; steps that do not lead to one are forgotten."""
+        direction = self._direction(here)
+        slope = _dot(here.gradient, direction)
+        if slope >= 0.0:
+            self.forget()
+            direction = self._direction(here)
+            slope = _dot(here.gradient, direction)
+        return direction, slope
+
+    def _direction(self, here: EnergyValue) -> Sites:
+        """Return the direction of L-BFGS (two-loop recursion)."""
+        q = here.gradient.copy()
+        factors = []
+        for moved, change, rho in reversed(self._pairs):
+            factor = rho * _dot(moved, q)
+            factors.append(factor)
+            q -= factor * change
+        q = self._scaled(q, here)
+        if self._pairs:
+            _, change, rho = self._pairs[-1]
+            q /= rho * _dot(change, self._scaled(change, here))
+        for (moved, change, rho), factor in zip(self._pairs, reversed(factors), strict=True):
+            q += (factor - rho * _dot(change, q)) * moved
+        return -q
+
+    def _scaled(self, gradient: Sites, here: EnergyValue) -> Sites:
+        """Return a gradient (S, d) times the initial matrix: over twice the masses, times the blocks in space."""
+        step = divide_rows(gradient, 2.0 * here.mass)
+        if self._blocks is not None:
+            step[:, :3] = np.einsum("sij,sj->si", self._blocks, step[:, :3])
+        return step
 
 
 def _line_search(
@@ -188,31 +224,6 @@ def _line_search(
             low = step
         step = 0.5 * (low + high) if np.isfinite(high) else 2.0 * low
     return best[0], best[1], _MAX_LINE_SEARCH_TRIALS
-
-
-def _direction(here: EnergyValue, pairs: deque[tuple[Sites, Sites, float]], blocks: PointTensors | None) -> Sites:
-    """Return the L-BFGS direction (two-loop recursion)."""
-    q = here.gradient.copy()
-    factors = []
-    for moved, change, rho in reversed(pairs):
-        factor = rho * _dot(moved, q)
-        factors.append(factor)
-        q -= factor * change
-    q = _scaled(q, here, blocks)
-    if pairs:
-        _, change, rho = pairs[-1]
-        q /= rho * _dot(change, _scaled(change, here, blocks))
-    for (moved, change, rho), factor in zip(pairs, reversed(factors), strict=True):
-        q += (factor - rho * _dot(change, q)) * moved
-    return -q
-
-
-def _scaled(gradient: Sites, here: EnergyValue, blocks: PointTensors | None) -> Sites:
-    """Return a gradient (S, d) times the initial matrix: over twice the masses, and times the blocks in space."""
-    step = divide_rows(gradient, 2.0 * here.mass)
-    if blocks is not None:
-        step[:, :3] = np.einsum("sij,sj->si", blocks, step[:, :3])
-    return step
 
 
 def _relative_gradient(here: EnergyValue) -> float:

@@ -14,9 +14,9 @@ from anisomesh.cvt.lbfgs import DescentOptions, Optimised, Status, minimise
 from anisomesh.cvt.lloyd import lloyd
 from anisomesh.cvt.relocation import relocate_to_creases, relocate_to_missed_points
 from anisomesh.cvt.sampling import resample_by_energy, sample_surface
-from anisomesh.deadline import NO_DEADLINE, Deadline
+from anisomesh.execution.deadline import NO_DEADLINE, Deadline
+from anisomesh.execution.progress import OnStep, StepInfo, ignore_steps
 from anisomesh.features.network import FeatureNetwork
-from anisomesh.progress import OnStep, StepInfo, ignore_steps
 from anisomesh.voronoi.diagram import Diagram
 from anisomesh.voronoi.restricted import RestrictedVoronoi
 

@@ -8,13 +8,13 @@ from functools import cached_property
 import numpy as np
 
 from anisomesh._arrays import EdgeEnds, Faces, Points, PointTensors, Sites
-from anisomesh.deadline import NO_DEADLINE, Deadline
 from anisomesh.delaunay.delta_complex import simplicial_mesh
 from anisomesh.delaunay.dual import dual_mesh
 from anisomesh.delaunay.faults import points_at_faults
 from anisomesh.delaunay.feature_mesh import FeatureMesh, edges_left, renumbered
 from anisomesh.delaunay.placement import place_vertices
 from anisomesh.delaunay.topology_control import ControlledCells, control_topology
+from anisomesh.execution.deadline import NO_DEADLINE, Deadline
 from anisomesh.features.network import FeatureNetwork
 from anisomesh.mesh.closest_points import ClosestPoints
 from anisomesh.mesh.surface import Surface

@@ -88,8 +88,8 @@ def evaluate(
     Parameters
     ----------
     reference
-        The input surface: a :class:`Surface`, a ``trimesh.Trimesh`` or a ``pyvista.PolyData``. It is repaired as
-        before a remesh, so that it has an orientation and a topology for comparison.
+        The input surface, as :func:`~anisomesh.io.convert.as_surface` takes it. It is repaired as before a remesh, so
+        that it has an orientation and a topology for comparison.
     result
         The remesh, of the same types and in the same coordinates; it is measured without repair.
     samples

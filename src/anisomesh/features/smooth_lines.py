@@ -15,7 +15,7 @@ from anisomesh.mesh.topology import edge_keys
 
 _ROUNDS, _PAIRS = 3, 2  # of flips and smoothing, and pairs of steps of smoothing after the flips of each
 _STEPS = (0.5, -0.52)  # of the way to the middle of the two neighbours: the first ends a zigzag, the second shrinkage
-_MIN_COSINE = 0.7  # between the normals of a face before and after
+_MIN_TURN_COSINE = 0.7  # between the normals of a face before and after
 _MIN_AREA = 0.2  # of a face, over its area before
 
 Keys = npt.NDArray[np.int64]  # (n,)
@@ -86,7 +86,7 @@ def _with_room(surface: Surface, lines: Keys, kept: Keys) -> Surface:
     new_keys = edge_keys(np.stack([tip, far], axis=1))
     good = ~np.isin(new_keys, keys) & np.isin(np.arange(len(tip)), np.unique(new_keys, return_index=True)[1])
     for triangles in (first, second):
-        good &= np.einsum("nx,nx->n", unit(face_cross(surface.points, triangles)), normals) > _MIN_COSINE
+        good &= np.einsum("nx,nx->n", unit(face_cross(surface.points, triangles)), normals) > _MIN_TURN_COSINE
     faces = surface.faces.copy()
     faces[face[good]], faces[other[good]] = first[good], second[good]
     return Surface(surface.points, faces)
@@ -109,7 +109,7 @@ def _without_folds(surface: Surface, before: Surface, trial: Points) -> Surface:
     while True:
         moved = surface.with_points(np.where(back[:, None], surface.points, trial))
         cosine = np.einsum("fx,fx->f", moved.face_normals, before.face_normals)
-        bad = (cosine < _MIN_COSINE) | (moved.face_areas < _MIN_AREA * before.face_areas)
+        bad = (cosine < _MIN_TURN_COSINE) | (moved.face_areas < _MIN_AREA * before.face_areas)
         more = np.zeros_like(back)
         more[surface.faces[bad]] = True
         more &= (moved.points != surface.points).any(axis=1)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import os
 from pathlib import Path
-from typing import Any
+from typing import Any, Literal
 
 import igl
 import numpy as np
@@ -15,6 +15,7 @@ from anisomesh._arrays import EdgeMask, PointMask
 from anisomesh.errors import MeshFileError, OptionError
 from anisomesh.mesh.surface import Surface
 from anisomesh.mesh.topology import edge_keys
+from anisomesh.repair.near_points import weld_distance
 
 _MAX_DIGITS = 18  # of a decimal number that fits in 64 bits
 _MIN_SEARCH_RADIUS = 1e-12  # times the diagonal of the input: rounding of copied points
@@ -45,7 +46,9 @@ def load_pairs(path: str | os.PathLike[str]) -> npt.NDArray[np.int64]:
     return np.array(pairs, dtype=np.int64).reshape(-1, 2)
 
 
-def tagged_edges(input_mesh: Surface, pairs: npt.ArrayLike, prepared: Surface, tolerance: float) -> EdgeMask:
+def tagged_edges(
+    input_mesh: Surface, pairs: npt.ArrayLike, prepared: Surface, tolerance: float | Literal["auto"]
+) -> EdgeMask:
     """Return which edges (E,) of the prepared surface are tagged.
 
     Parameters
@@ -57,7 +60,7 @@ def tagged_edges(input_mesh: Surface, pairs: npt.ArrayLike, prepared: Surface, t
     prepared
         The surface after repair, in the same coordinates.
     tolerance
-        Weld tolerance of the repair, in model units.
+        Weld tolerance of the repair, in model units or ``"auto"``.
 
     Raises
     ------
@@ -80,7 +83,9 @@ def tagged_edges(input_mesh: Surface, pairs: npt.ArrayLike, prepared: Surface, t
     return found
 
 
-def tagged_points(input_mesh: Surface, points: npt.NDArray[np.int64], prepared: Surface, tolerance: float) -> PointMask:
+def tagged_points(
+    input_mesh: Surface, points: npt.NDArray[np.int64], prepared: Surface, tolerance: float | Literal["auto"]
+) -> PointMask:
     """Return which points (V,) of the prepared surface are at points (n,) of the input mesh.
 
     The other parameters are the ones of :func:`tagged_edges`.
@@ -91,8 +96,8 @@ def tagged_points(input_mesh: Surface, points: npt.NDArray[np.int64], prepared: 
     return found
 
 
-def _search_radius(input_mesh: Surface, tolerance: float) -> float:
-    return max(tolerance, _MIN_SEARCH_RADIUS * input_mesh.diagonal)
+def _search_radius(input_mesh: Surface, tolerance: float | Literal["auto"]) -> float:
+    return max(weld_distance(input_mesh, tolerance), _MIN_SEARCH_RADIUS * input_mesh.diagonal)
 
 
 def _checked_pairs(input_mesh: Surface, pairs: npt.ArrayLike) -> npt.NDArray[np.int64]:

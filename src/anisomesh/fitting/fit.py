@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass, field, replace
 
-from anisomesh.deadline import NO_DEADLINE, Deadline
+from anisomesh.execution.deadline import NO_DEADLINE, Deadline
 from anisomesh.fitting.arrays import FitTask
 from anisomesh.fitting.samples import SurfaceSamples
 from anisomesh.fitting.state import FitState

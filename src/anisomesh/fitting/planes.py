@@ -11,7 +11,7 @@ from anisomesh.fitting.samples import SurfaceSamples
 _SAME_PLANE = 1e-9  # sine between normals, and distance at bounding-box diagonal 1
 _MIN_SAMPLES = 3  # of a triangle in a plane
 _MAX_STEP = 1e-5  # at bounding-box diagonal 1: nothing overlaps that did not before
-_MIN_EIGENVALUE = 1e-3  # of a sum of n n^t: planes with a smaller angle leave a point where it is
+_MIN_ANGLE_EIGENVALUE = 1e-3  # of a sum of n n^t: planes with a smaller angle leave a point where it is
 
 
 def onto_planes(points: Points, faces: Faces, samples: SurfaceSamples, owner: FaceLabels, movable: PointMask) -> Points:
@@ -40,7 +40,7 @@ def onto_planes(points: Points, faces: Faces, samples: SurfaceSamples, owner: Fa
     np.add.at(matrix, corner, normals[:, :, None] * normals[:, None, :])
     np.add.at(right, corner, (offsets - np.einsum("nx,nx->n", normals, points[corner]))[:, None] * normals)
     values, vectors = np.linalg.eigh(matrix)
-    inverse = np.divide(1.0, values, out=np.zeros_like(values), where=values > _MIN_EIGENVALUE)
+    inverse = np.divide(1.0, values, out=np.zeros_like(values), where=values > _MIN_ANGLE_EIGENVALUE)
     step = np.einsum("vxk,vk,vyk,vy->vx", vectors, inverse, vectors, right)
     moved = points + step
     off = np.abs(np.einsum("nx,nx->n", normals, moved[corner]) - offsets)

@@ -8,11 +8,11 @@ import numpy as np
 import numpy.typing as npt
 
 from anisomesh._kernels import fit_collapses, fit_moves, fit_samples, fit_splits
+from anisomesh.execution.threads import Workers
 from anisomesh.fitting.arrays import STAYS, FitTask, fit_arrays_of, workspace
 from anisomesh.fitting.planes import onto_planes
 from anisomesh.fitting.samples import SurfaceSamples
 from anisomesh.mesh.surface import Surface
-from anisomesh.threads import Workers
 
 _MIN_RMS = 1e-8  # of the diagonal of the surface: an error that counts as exact
 _MAX_DISTANCE = 5.0  # of a vertex from the surface, in root mean squared errors at the start; heuristic

@@ -7,7 +7,7 @@ from dataclasses import replace
 import numpy as np
 
 from anisomesh._arrays import EdgeEnds
-from anisomesh.deadline import NO_DEADLINE, Deadline
+from anisomesh.execution.deadline import NO_DEADLINE, Deadline
 from anisomesh.fitting.arrays import FitTask
 from anisomesh.fitting.fit import FitOptions, fit_mesh
 from anisomesh.fitting.target import FitTarget

@@ -13,6 +13,7 @@ import numpy.typing as npt
 from anisomesh._arrays import Points
 from anisomesh.errors import MeshFileError
 from anisomesh.io.atomic import atomic_path
+from anisomesh.io.formats.vtk_xml import vtu_bytes
 
 N_COLOURS = 12  # colours of the palette; heuristic
 _HASH_MULTIPLIER = 2654435761  # near 2^32 / golden ratio: multiplicative hashing, Knuth, TAOCP vol. 3, section 6.4
@@ -59,16 +60,8 @@ def save_polygons(mesh: PolygonMesh, path: str | os.PathLike[str]) -> None:
 
 
 def _write_vtu(mesh: PolygonMesh, path: Path) -> None:
-    import meshio
-
-    sizes = np.diff(mesh.offset)
-    blocks, order = [], []
-    for size in np.unique(sizes):
-        chosen = np.flatnonzero(sizes == size)
-        blocks.append(("polygon", mesh.offset[chosen][:, None] + np.arange(size)))
-        order.append(chosen)
-    data = {"cell": [mesh.cell[chosen] for chosen in order], "colour": [mesh.colour[chosen] for chosen in order]}
-    meshio.Mesh(mesh.points, blocks, cell_data=data).write(path, file_format="vtu")
+    corners, sizes = np.arange(mesh.offset[-1]), np.diff(mesh.offset)
+    path.write_bytes(vtu_bytes(mesh.points, corners, sizes, {}, {"cell": mesh.cell, "colour": mesh.colour}))
 
 
 def _write_obj(mesh: PolygonMesh, path: Path) -> None:

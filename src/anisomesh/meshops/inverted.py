@@ -7,7 +7,7 @@ from collections.abc import Iterator, Sequence
 import numpy as np
 
 from anisomesh._arrays import Faces, Points
-from anisomesh.deadline import NO_DEADLINE, Deadline
+from anisomesh.execution.deadline import NO_DEADLINE, Deadline
 from anisomesh.mesh import geometry
 from anisomesh.mesh.closest_points import ClosestPoints
 from anisomesh.mesh.surface import Surface

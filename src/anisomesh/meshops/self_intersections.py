@@ -8,7 +8,7 @@ from itertools import chain
 import numpy as np
 
 from anisomesh._arrays import Faces, Points
-from anisomesh.deadline import NO_DEADLINE, Deadline
+from anisomesh.execution.deadline import NO_DEADLINE, Deadline
 from anisomesh.mesh.closest_points import ClosestPoints
 from anisomesh.mesh.intersections import count_intersections_from
 from anisomesh.mesh.surface import Surface

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import logging
 from dataclasses import dataclass, fields
+from typing import Literal
 
 import numpy as np
 
@@ -12,7 +13,8 @@ from anisomesh.errors import MeshError, OptionError
 from anisomesh.mesh import geometry, topology
 from anisomesh.mesh.surface import Surface
 from anisomesh.mesh.weld import coincident
-from anisomesh.repair import degenerate, duplicates, orientation
+from anisomesh.repair import degenerate, duplicates, orientation, t_junctions
+from anisomesh.repair.near_points import weld_distance
 
 logger = logging.getLogger(__name__)
 
@@ -26,6 +28,7 @@ _CHANGE_DESCRIPTIONS = {
     "faces_duplicate": "{} duplicate face(s) removed",
     "points_unreferenced": "{} unused point(s) removed",
     "faces_flipped": "{} face(s) reversed to agree with their neighbours",
+    "sides_split": "{} side(s) split at points of other faces that lie on them",
     "edges_nonmanifold_cut": "{} edge(s) with more than two faces cut apart",
     "edges_nonorientable_cut": "{} edge(s) cut open because the surface is not orientable",
     "points_nonmanifold_split": "{} point(s) added to split non-manifold points",
@@ -48,6 +51,8 @@ class PrepareReport:
         Removed points that no face used.
     faces_flipped
         Faces whose orientation was reversed.
+    sides_split
+        Sides of faces that were split where points of other faces lie on them (T-junctions).
     edges_nonmanifold_cut
         Edges with more than two faces, cut apart.
     edges_nonorientable_cut
@@ -63,6 +68,7 @@ class PrepareReport:
     faces_duplicate: int = 0
     points_unreferenced: int = 0
     faces_flipped: int = 0
+    sides_split: int = 0
     edges_nonmanifold_cut: int = 0
     edges_nonorientable_cut: int = 0
     points_nonmanifold_split: int = 0
@@ -99,7 +105,7 @@ class Prepared:
     point_source: PointLabels
 
 
-def prepare(surface: Surface, *, weld_tolerance: float = 0.0) -> Prepared:
+def prepare(surface: Surface, *, weld_tolerance: float | Literal["auto"] = 0.0) -> Prepared:
     """Make any triangle mesh an oriented manifold, with as few changes as possible.
 
     Parameters
@@ -107,7 +113,8 @@ def prepare(surface: Surface, *, weld_tolerance: float = 0.0) -> Prepared:
     surface
         Any triangle mesh.
     weld_tolerance
-        Points up to this distance, in model units, are merged; 0 merges equal points only.
+        Points up to this distance, in model units, are merged; 0 merges equal points only, ``"auto"`` is 1e-5 of the
+        bounding-box diagonal.
 
     Returns
     -------
@@ -123,17 +130,18 @@ def prepare(surface: Surface, *, weld_tolerance: float = 0.0) -> Prepared:
 
     Notes
     -----
-    The steps of a pass are: weld points; remove degenerate and duplicate faces; orient each component by the larger
-    part of its area, cutting edges where that is impossible; glue faces at edges with two faces, and at other edges
-    the pairs that bound the same wedge of the solid, so that two cubes sharing an edge become two closed cubes; give
-    each fan of faces its own point. Passes are repeated until nothing changes, so that a second call of this function
-    changes nothing. Sorting dominates the cost, O((V + F) log(V + F)).
+    The steps of a pass are: weld points; remove degenerate and duplicate faces; split sides at T-junctions; orient each
+    component by the larger part of its area, cutting edges where that is impossible; glue faces at edges with two
+    faces, and at other edges the pairs that bound the same wedge of the solid, so that two cubes sharing an edge become
+    two closed cubes; give each fan of faces its own point. Passes are repeated until nothing changes, so that a second
+    call of this function changes nothing. Sorting dominates the cost, O((V + F) log(V + F)).
     """
     _check_range(surface)
-    _check_tolerance(surface, weld_tolerance)
-    passes = [_repair_once(surface, weld_tolerance)]
+    tolerance = weld_distance(surface, weld_tolerance)
+    _check_tolerance(surface, tolerance)
+    passes = [_repair_once(surface, tolerance)]
     while passes[-1].changed and len(passes) < _MAX_REPAIR_PASSES:
-        passes.append(_repair_once(passes[-1].surface, weld_tolerance))
+        passes.append(_repair_once(passes[-1].surface, tolerance))
     result = passes[-1].surface
     source = passes[0].source
     for later in passes[1:]:
@@ -145,6 +153,7 @@ def prepare(surface: Surface, *, weld_tolerance: float = 0.0) -> Prepared:
         faces_duplicate=sum(each.n_duplicate for each in passes),
         points_unreferenced=surface.n_points - n_used,
         faces_flipped=sum(each.n_flipped for each in passes),
+        sides_split=sum(each.n_split for each in passes),
         edges_nonmanifold_cut=passes[0].n_nonmanifold_edges if passes[0].changed else 0,
         edges_nonorientable_cut=passes[-1].n_conflicts if passes[0].changed else 0,
         points_nonmanifold_split=result.n_points - n_sources,
@@ -165,6 +174,7 @@ class _RepairPass:
     n_degenerate: int = 0
     n_duplicate: int = 0
     n_flipped: int = 0
+    n_split: int = 0
     n_nonmanifold_edges: int = 0
     n_conflicts: int = 0
 
@@ -172,7 +182,7 @@ class _RepairPass:
 def _repair_once(surface: Surface, tolerance: float) -> _RepairPass:
     """Run all steps once; sides without a partner may find one in the next pass."""
     labels = _weld(surface, tolerance)
-    if _is_clean(surface, labels):
+    if _is_clean(surface, labels, tolerance):
         return _RepairPass(surface=surface, source=np.arange(surface.n_points, dtype=np.int32), changed=False)
     n_degenerate = int(degenerate.is_degenerate(surface.points, labels[surface.faces]).sum())
     faces, labels = degenerate.remove_degenerate(surface.points, surface.faces, labels)
@@ -180,6 +190,8 @@ def _repair_once(surface: Surface, tolerance: float) -> _RepairPass:
     faces = faces[duplicates.select_unique_faces(labels[faces])]
     if len(faces) == 0:
         raise MeshError(f"none of the {surface.n_faces:,} faces has an area; nothing is left after the repair")
+    n_unique = len(faces)
+    faces, n_split = t_junctions.split_at_t_junctions(surface.points, faces, labels, tolerance)
     pairs, nonmanifold = orientation.pair_sides(faces, labels[faces])
     areas = 0.5 * np.linalg.norm(geometry.face_cross(surface.points, labels[faces]), axis=1)
     found = orientation.find_orientation(labels[faces], pairs, areas)
@@ -196,7 +208,8 @@ def _repair_once(surface: Surface, tolerance: float) -> _RepairPass:
         source=source,
         changed=changed,
         n_degenerate=n_degenerate,
-        n_duplicate=n_nondegenerate - len(faces),
+        n_duplicate=n_nondegenerate - n_unique,
+        n_split=n_split,
         n_flipped=int(found.flip.sum()),
         n_nonmanifold_edges=len(np.unique(topology.edges_of(welded)[1].ravel()[nonmanifold])),
         n_conflicts=int(found.conflict.sum()),
@@ -230,7 +243,7 @@ def _weld(surface: Surface, tolerance: float) -> PointLabels:
     return labels
 
 
-def _is_clean(surface: Surface, labels: PointLabels) -> bool:
+def _is_clean(surface: Surface, labels: PointLabels, tolerance: float) -> bool:
     """Return whether no repair is needed; coincident points are accepted unless welding them would close a gap."""
     faces, used = surface.faces, np.unique(surface.faces)
     if len(used) < surface.n_points or surface.edge_face_count.max() > 2 or not topology.is_oriented(faces):
@@ -242,6 +255,7 @@ def _is_clean(surface: Surface, labels: PointLabels) -> bool:
         and topology.count_nonmanifold_points(faces) == 0
         and not degenerate.is_degenerate(surface.points, labels[faces]).any()
         and duplicates.select_unique_faces(faces).all()
+        and t_junctions.split_at_t_junctions(surface.points, faces, labels, tolerance)[1] == 0
     )
 
 

@@ -11,7 +11,7 @@ from scipy.spatial import cKDTree
 from anisomesh._arrays import Sites
 from anisomesh._kernels import clip
 from anisomesh._kernels.neighbours import age_lists, displacements, limit_radius, refresh_lists, walk
-from anisomesh.threads import Workers
+from anisomesh.execution.threads import Workers
 from anisomesh.voronoi.blocks import Blocks
 
 # performance only: no value changes a result beyond rounding (benchmarks/speed.py)

@@ -12,8 +12,8 @@ import numpy.typing as npt
 from anisomesh._arrays import Sites, SiteScalars
 from anisomesh._kernels import clip, diagram, integrate
 from anisomesh.errors import OptionError
+from anisomesh.execution.threads import Workers
 from anisomesh.mesh.embedded_surface import EmbeddedSurface
-from anisomesh.threads import Workers
 from anisomesh.voronoi.diagram import Diagram, DiagramPart, assemble
 from anisomesh.voronoi.neighbour_lists import NeighbourLists
 
@@ -188,7 +188,7 @@ class RestrictedVoronoi:
             if len(problems) == 0:
                 return parts
             self._repair(problems, sites)
-            facets = problems[:, 0]
+            facets = np.ascontiguousarray(problems[:, 0])  # kernels are compiled anew for other memory layouts
         raise RuntimeError(f"{len(problems)} facets could not be clipped, the first: {problems[0].tolist()}")
 
     def _repair(self, problems: Problems, sites: Sites) -> None:

@@ -10,9 +10,9 @@ from pathlib import Path
 import numpy as np
 
 from anisomesh.errors import AnisomeshError, OptionError
+from anisomesh.execution.isolation import isolated
 from anisomesh.io.atomic import append_line, atomic_path, drop_cut_line
 from anisomesh.io.meshes import load
-from anisomesh.isolation import isolated
 from anisomesh.learn.data.items import save_item
 from anisomesh.learn.data.make import UnsuitableError, items_of_blobs, items_of_mesh, require_packages
 from anisomesh.learn.data.manifest import MANIFEST, ManifestRow, read_manifest

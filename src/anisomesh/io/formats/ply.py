@@ -2,14 +2,16 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
+from typing import Any, NamedTuple
 
 import numpy as np
 import numpy.typing as npt
 
 from anisomesh._arrays import Faces, Points
-from anisomesh.io.polygons import PolygonSoup
+from anisomesh.io.cells import SurfaceCells, strip_triangles
+from anisomesh.io.polygons import Integers, PolygonSoup
 
 _NUMPY_TYPES = {
     **dict.fromkeys(("char", "int8"), "i1"),
@@ -18,11 +20,14 @@ _NUMPY_TYPES = {
     **dict.fromkeys(("ushort", "uint16"), "u2"),
     **dict.fromkeys(("int", "int32"), "i4"),
     **dict.fromkeys(("uint", "uint32"), "u4"),
+    **dict.fromkeys(("int64", "longlong"), "i8"),
+    **dict.fromkeys(("uint64", "ulonglong"), "u8"),
     **dict.fromkeys(("float", "float32"), "f4"),
     **dict.fromkeys(("double", "float64"), "f8"),
 }
 _BYTE_ORDERS = {"ascii": "", "binary_little_endian": "<", "binary_big_endian": ">"}
 _INDEX_PROPERTIES = ("vertex_indices", "vertex_index")  # both are in use for the corners of a face
+_RESTART = -1  # ends a strip in a list of strips
 
 
 @dataclass(frozen=True)
@@ -39,29 +44,56 @@ class _Element:
     properties: tuple[_Property, ...]
 
 
+class _PropertyValues(NamedTuple):
+    """The values of a property in all rows, concatenated, and how many each row has."""
+
+    values: npt.NDArray[np.float64] | Integers
+    sizes: Integers
+
+
 def read_ply(data: bytes) -> PolygonSoup:
-    """Read the points and polygons of a PLY file; ValueError if it is malformed or truncated."""
+    """Read the points, polygons and strips of triangles of a PLY file; ValueError if it is malformed or truncated."""
     order, elements, start = _header(data)
     if not any(element.name == "vertex" for element in elements):
         raise ValueError("the header declares no vertex element")
     body = _TextBody(data[start:].split()) if order == "" else _BinaryBody(data, start, order)
-    points = np.zeros((0, 3))
-    corners = sizes = np.zeros(0, dtype=np.int64)
+    points, cells = np.zeros((0, 3)), SurfaceCells()
     for element in elements:
-        names = [prop.name for prop in element.properties]
+        scalars = [prop.name for prop in element.properties if not prop.count_type]
         lists = [prop.name for prop in element.properties if prop.count_type]
         if element.name == "vertex":
-            if lists or not {"x", "y", "z"} <= set(names):
+            if not {"x", "y", "z"} <= set(scalars):
+                names = scalars + lists
                 raise ValueError(f"the vertex element has properties {names}; expected scalars with x, y and z")
-            columns = body.table(element)
-            points = np.stack([columns[name].astype(np.float64) for name in "xyz"], axis=1)
-        elif element.name == "face" and (index := next((name for name in _INDEX_PROPERTIES if name in lists), None)):
-            corners, sizes = body.lists(element, names.index(index))
-        elif lists:
-            body.lists(element, names.index(lists[0]))
+            columns = body.read(element, "xyz")
+            points = np.stack([columns[name].values.astype(np.float64) for name in "xyz"], axis=1)
+        elif element.name in ("face", "tristrips"):
+            index = next((name for name in _INDEX_PROPERTIES if name in lists), None)
+            if index is None and element.count:
+                raise ValueError(f"the {element.name} element has the lists {lists}; expected {_INDEX_PROPERTIES[0]}")
+            columns = body.read(element, (index,) if index else ())
+            if index:
+                _add(cells, element.name, columns[index])
         else:
-            body.table(element)
-    return PolygonSoup(points=points, corners=corners, sizes=sizes)
+            body.read(element, ())
+    return cells.soup(points)
+
+
+def _add(cells: SurfaceCells, name: str, corners: _PropertyValues) -> None:
+    """Add faces, or strips that are ended by -1; a strip counts as one face."""
+    values = corners.values.astype(np.int64)
+    if name == "face":
+        cells.add_polygons(values, corners.sizes)
+        return
+    strips = np.split(values, np.cumsum(corners.sizes)[:-1]) if len(corners.sizes) else []
+    for strip in strips:
+        triangles = [strip_triangles(part[part != _RESTART]) for part in _parts(strip)]
+        rows = np.concatenate(triangles)
+        cells.add("triangle", rows, np.repeat(cells.take_numbers(1), len(rows)))
+
+
+def _parts(strip: Integers) -> list[Integers]:
+    return np.split(strip, np.flatnonzero(strip == _RESTART))
 
 
 def ply_bytes(points: Points, faces: Faces, scalars: Mapping[str, npt.NDArray[np.float64]]) -> bytes:
@@ -126,43 +158,55 @@ class _TextBody:
         self.words = words
         self.position = 0
 
-    def _take(self, count: int, element: _Element) -> npt.NDArray[np.float64]:
-        if self.position + count > len(self.words):
-            raise _truncated(element)
-        self.position += count
-        try:
-            return np.array(list(map(float, self.words[self.position - count : self.position])), dtype=np.float64)
-        except ValueError as error:
-            raise ValueError(f"element {element.name}: {error}") from None
-
-    def table(self, element: _Element) -> dict[str, npt.NDArray[np.float64]]:
-        """Read an element of scalars; return a column (count,) for each property."""
-        width = len(element.properties)
-        table = self._take(element.count * width, element).reshape(element.count, width)
-        return {prop.name: table[:, k] for k, prop in enumerate(element.properties)}
-
-    def lists(self, element: _Element, wanted: int) -> tuple[npt.NDArray[np.int64], npt.NDArray[np.int64]]:
-        """Read an element with lists; return the concatenated lists of property number ``wanted`` and their sizes."""
-        starts, sizes = [], []
+    def read(self, element: _Element, wanted: Iterable[str]) -> dict[str, _PropertyValues]:
+        """Read an element; return the properties with these names."""
+        if not any(prop.count_type for prop in element.properties):
+            return self._table(element, wanted)
+        places: dict[str, tuple[list[int], list[int]]] = {name: ([], []) for name in wanted}
         at, limit = self.position, len(self.words)
         for _ in range(element.count):
-            for k, prop in enumerate(element.properties):
+            for prop in element.properties:
                 if at >= limit:
                     raise _truncated(element)
                 size = int(self.words[at]) if prop.count_type else 1
                 if size < 0:
                     raise ValueError(f"element {element.name}: a list of {size} values")
                 at += bool(prop.count_type)
-                if k == wanted:
-                    starts.append(at)
-                    sizes.append(size)
+                if prop.name in places:
+                    places[prop.name][0].append(at)
+                    places[prop.name][1].append(size)
                 at += size
         if at > limit:
             raise _truncated(element)
         self.position = at
+        kinds = {prop.name: prop.type for prop in element.properties}
+        return {name: self._column(kinds[name], *found) for name, found in places.items()}
+
+    def _column(self, kind: str, starts: list[int], sizes: list[int]) -> _PropertyValues:
         words = self.words
-        flat = [int(word) for a, n in zip(starts, sizes, strict=True) for word in words[a : a + n]]
-        return np.array(flat, dtype=np.int64), np.array(sizes, dtype=np.int64)
+        flat = [word for start, size in zip(starts, sizes, strict=True) for word in words[start : start + size]]
+        values: npt.NDArray[np.float64] | Integers
+        if kind.startswith("f"):
+            values = np.array([float(word) for word in flat], dtype=np.float64)
+        else:
+            values = np.array([int(word) for word in flat], dtype=np.int64)
+        return _PropertyValues(values, np.array(sizes, dtype=np.int64))
+
+    def _table(self, element: _Element, wanted: Iterable[str]) -> dict[str, _PropertyValues]:
+        """Read an element of scalars."""
+        width = len(element.properties)
+        count = element.count * width
+        if self.position + count > len(self.words):
+            raise _truncated(element)
+        self.position += count
+        try:
+            words = self.words[self.position - count : self.position]
+            table = np.array(list(map(float, words)), dtype=np.float64).reshape(element.count, width)
+        except ValueError as error:
+            raise ValueError(f"element {element.name}: {error}") from None
+        names = [prop.name for prop in element.properties]
+        ones = np.ones(element.count, dtype=np.int64) if width else np.zeros(0, dtype=np.int64)
+        return {name: _PropertyValues(table[:, names.index(name)], ones) for name in wanted}
 
 
 class _BinaryBody:
@@ -173,65 +217,65 @@ class _BinaryBody:
         self.position = start
         self.order = order
 
-    def _rows(self, dtype: np.dtype[np.void], element: _Element) -> npt.NDArray[np.void]:
-        if self.position + element.count * dtype.itemsize > len(self.data):
-            raise _truncated(element)
-        return np.frombuffer(self.data, dtype=dtype, count=element.count, offset=self.position)
-
-    def table(self, element: _Element) -> dict[str, npt.NDArray[np.float64]]:
-        """Read an element of scalars; return a column (count,) for each property."""
+    def read(self, element: _Element, wanted: Iterable[str]) -> dict[str, _PropertyValues]:
+        """Read an element; return the properties with these names."""
         if not element.properties:
             return {}
-        rows = self._rows(np.dtype([(prop.name, self.order + prop.type) for prop in element.properties]), element)
-        self.position += rows.nbytes
-        return {prop.name: rows[prop.name].astype(np.float64) for prop in element.properties}
+        columns = self._equal_rows(element, wanted)
+        return self._any_rows(element, wanted) if columns is None else columns
 
-    def lists(self, element: _Element, wanted: int) -> tuple[npt.NDArray[np.int64], npt.NDArray[np.int64]]:
-        """Read an element with lists; return the concatenated lists of property number ``wanted`` and their sizes."""
-        equal = self._equal_lists(element, wanted)
-        return self._any_lists(element, wanted) if equal is None else equal
-
-    def _equal_lists(
-        self, element: _Element, wanted: int
-    ) -> tuple[npt.NDArray[np.int64], npt.NDArray[np.int64]] | None:
+    def _equal_rows(self, element: _Element, wanted: Iterable[str]) -> dict[str, _PropertyValues] | None:
         """Read all rows as one array if their lists have the sizes of the first row's; else return None."""
-        if element.count == 0:
-            return np.zeros(0, dtype=np.int64), np.zeros(0, dtype=np.int64)
         fields: list[tuple[str, str] | tuple[str, str, tuple[int]]] = []
         sizes, at = {}, self.position
-        for k, prop in enumerate(element.properties):
+        for prop in element.properties:
+            size = 1
             if prop.count_type:
-                sizes[k], at = self._list_size(prop.count_type, at, element)
-                fields.append((f"count{k}", self.order + prop.count_type))
-            fields.append((f"value{k}", self.order + prop.type, (sizes.get(k, 1),)))
-            at += sizes.get(k, 1) * np.dtype(prop.type).itemsize
+                if element.count:
+                    size, at = self._list_size(prop.count_type, at, element)
+                sizes[prop.name] = size
+                fields.append((f"count {prop.name}", self.order + prop.count_type))
+            fields.append((f"value {prop.name}", self.order + prop.type, (size,)))
+            at += size * np.dtype(prop.type).itemsize
         dtype = np.dtype(fields)
         if self.position + element.count * dtype.itemsize > len(self.data):
-            return None
-        rows = self._rows(dtype, element)
-        if any((rows[f"count{k}"] != size).any() for k, size in sizes.items()):
+            if sizes:
+                return None
+            raise _truncated(element)
+        rows = np.frombuffer(self.data, dtype=dtype, count=element.count, offset=self.position)
+        if any((rows[f"count {name}"] != size).any() for name, size in sizes.items()):
             return None
         self.position += rows.nbytes
-        return rows[f"value{wanted}"].astype(np.int64).ravel(), np.full(element.count, sizes[wanted], dtype=np.int64)
+        columns = {}
+        for name in wanted:
+            lengths = np.full(element.count, sizes.get(name, 1), dtype=np.int64)
+            columns[name] = _PropertyValues(_native(rows[f"value {name}"].ravel()), lengths)
+        return columns
 
-    def _any_lists(self, element: _Element, wanted: int) -> tuple[npt.NDArray[np.int64], npt.NDArray[np.int64]]:
+    def _any_rows(self, element: _Element, wanted: Iterable[str]) -> dict[str, _PropertyValues]:
         """Read row by row."""
-        chunks, sizes, at = [], [], self.position
+        chunks: dict[str, tuple[list[bytes], list[int]]] = {name: ([], []) for name in wanted}
+        at = self.position
         for _ in range(element.count):
-            for k, prop in enumerate(element.properties):
+            for prop in element.properties:
                 size = 1
                 if prop.count_type:
                     size, at = self._list_size(prop.count_type, at, element)
                 width = size * np.dtype(prop.type).itemsize
-                if k == wanted:
-                    chunks.append(self.data[at : at + width])
-                    sizes.append(size)
+                if prop.name in chunks:
+                    chunks[prop.name][0].append(self.data[at : at + width])
+                    chunks[prop.name][1].append(size)
                 at += width
-        if at > len(self.data):
-            raise _truncated(element)
+            if at > len(self.data):
+                raise _truncated(element)
         self.position = at
-        flat = np.frombuffer(b"".join(chunks), dtype=self.order + element.properties[wanted].type)
-        return flat.astype(np.int64), np.array(sizes, dtype=np.int64)
+        kinds = {prop.name: self.order + prop.type for prop in element.properties}
+        return {
+            name: _PropertyValues(
+                _native(np.frombuffer(b"".join(found), dtype=kinds[name])), np.array(lengths, dtype=np.int64)
+            )
+            for name, (found, lengths) in chunks.items()
+        }
 
     def _list_size(self, kind: str, at: int, element: _Element) -> tuple[int, int]:
         """Return the size of the list at a position and the position of its first value."""
@@ -242,3 +286,7 @@ class _BinaryBody:
         if count < 0:
             raise ValueError(f"element {element.name}: a list of {count} values")
         return count, at + dtype.itemsize
+
+
+def _native(values: npt.NDArray[Any]) -> npt.NDArray[np.float64] | Integers:
+    return values.astype(np.float64) if values.dtype.kind == "f" else values.astype(np.int64)

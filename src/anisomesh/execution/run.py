@@ -6,9 +6,9 @@ import time
 from collections.abc import Iterator
 from contextlib import contextmanager
 
-from anisomesh.deadline import Deadline
 from anisomesh.errors import TimeLimitError
-from anisomesh.progress import OnStep, StepInfo
+from anisomesh.execution.deadline import Deadline
+from anisomesh.execution.progress import OnStep, StepInfo
 
 OPTIMISATION_SHARE = 0.6  # of the time limit, for everything up to the end of the optimisation
 

@@ -1,0 +1,84 @@
+"""Numbers of a section of a Gmsh file, read one after the other from text or binary."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+
+from anisomesh.io.formats.words import whole
+from anisomesh.io.polygons import Integers
+
+
+class NumberStream:
+    """The numbers of a section.
+
+    Parameters
+    ----------
+    section
+        The bytes between the first and the last line.
+    binary
+        Whether they are binary.
+    order
+        Byte order, ``"<"`` or ``">"``.
+    size_bytes
+        Bytes of a number of type "size".
+    """
+
+    def __init__(self, section: bytes, *, binary: bool, order: str, size_bytes: int) -> None:
+        self.binary = binary
+        self._order = order
+        self._size_bytes = size_bytes
+        self._bytes = section
+        self._words: list[bytes] | None = None
+        self._position = 0
+
+    def of(self, section: bytes) -> NumberStream:
+        """Return a stream of the same type over another section."""
+        return NumberStream(section, binary=self.binary, order=self._order, size_bytes=self._size_bytes)
+
+    def line_count(self) -> int:
+        """Return the number in the first line, which is text in binary files too; ValueError if it is not a count."""
+        line, _, self._bytes = self._bytes.partition(b"\n")
+        if not line.strip().isdigit():
+            raise ValueError(f"malformed: {line[:20].decode(errors='replace')!r} is not a count")
+        return int(line)
+
+    def lines(self, count: int) -> list[bytes]:
+        """Return the next lines that are not empty, in a text file; ValueError if there are fewer."""
+        lines = [line for line in self._bytes.splitlines() if line.strip()]
+        if len(lines) < count:
+            raise ValueError(f"truncated: it declares {count} lines but {len(lines)} follow")
+        return lines[:count]
+
+    def take(self, count: int, kind: str) -> npt.NDArray[Any]:
+        """Return the next numbers (count,), float64 in a text file; ValueError if there are fewer.
+
+        Parameters
+        ----------
+        count
+            How many.
+        kind
+            In a binary file their NumPy type, or ``"size"``.
+        """
+        dtype = np.dtype(self._order + (f"u{self._size_bytes}" if kind == "size" else kind[1:]))
+        start = self._position
+        self._position += count * (dtype.itemsize if self.binary else 1)
+        if self._words is None and not self.binary:
+            self._words = self._bytes.split()
+        available = len(self._bytes) if self._words is None else len(self._words)
+        if count < 0 or self._position > available:
+            raise ValueError(f"truncated or malformed: it declares {count} numbers where fewer follow")
+        if self._words is None:
+            return np.frombuffer(self._bytes[start : self._position], dtype=dtype)
+        return np.array(list(map(float, self._words[start : self._position])), dtype=np.float64)
+
+    def records(self, count: int, width: int = 3) -> tuple[Integers, npt.NDArray[np.float64]]:
+        """Return the next rows of a tag and ``width`` coordinates: tags (count,), coordinates (count, width)."""
+        if not self.binary:
+            table = self.take((1 + width) * count, "<f8").reshape(count, 1 + width)
+            return whole(table[:, 0]), table[:, 1:]
+        dtype = np.dtype([("tag", self._order + "i4"), ("xyz", self._order + "f8", width)])
+        rows = self.take(count * dtype.itemsize, "<i1").view(dtype)
+        return rows["tag"].astype(np.int64), rows["xyz"].astype(np.float64)

@@ -1,0 +1,204 @@
+"""3MF: a zip archive of XML models of triangles.
+
+Format: https://github.com/3MFConsortium/spec_core/blob/master/3MF%20Core%20Specification.md.
+"""
+
+from __future__ import annotations
+
+import io
+import re
+import zipfile
+from array import array
+from dataclasses import dataclass, field
+from typing import Any
+from xml.parsers import expat
+
+import numpy as np
+import numpy.typing as npt
+
+from anisomesh._arrays import Faces, Points
+from anisomesh.io.cells import SurfaceCells
+from anisomesh.io.formats.words import format_rows
+from anisomesh.io.polygons import Integers, PolygonSoup
+
+_ROOT = "3D/3dmodel.model"
+_MODEL_TYPE = "http://schemas.microsoft.com/3dmanufacturing/2013/01/3dmodel"
+_CORE = "http://schemas.microsoft.com/3dmanufacturing/core/2015/02"
+_DEEPEST_COMPONENTS = 100
+_MAX_OBJECTS = 100_000
+_LARGEST_SHARE = 1_100  # uncompressed bytes per byte of an entry; zlib reaches 1,032
+_DATE = (1980, 1, 1, 0, 0, 0)  # of all entries, so that the same mesh gives the same file
+
+
+@dataclass
+class _Object:
+    """An object of a model: a mesh, or copies of other objects."""
+
+    points: array[float] = field(default_factory=lambda: array("d"))
+    faces: array[int] = field(default_factory=lambda: array("q"))
+    components: list[tuple[tuple[str, str], str]] = field(default_factory=list)
+
+
+@dataclass
+class _Model:
+    """A part of the archive with objects by number, and what is built of them."""
+
+    objects: dict[str, _Object] = field(default_factory=dict)
+    items: list[tuple[tuple[str, str], str]] = field(default_factory=list)
+    ignored: set[str] = field(default_factory=set)
+
+
+def read_3mf(data: bytes) -> PolygonSoup:
+    """Read the objects that a 3MF archive builds, in their places, in its unit; all objects if it builds none."""
+    try:
+        archive = zipfile.ZipFile(io.BytesIO(data))
+    except zipfile.BadZipFile as error:
+        raise ValueError(f"truncated or malformed: it is not a zip archive as a 3MF file is ({error})") from None
+    with archive:
+        build = _Build(archive)
+        root = build.model(_root_name(archive))
+        items = root.items or [(("", number), "") for number in root.objects]
+        for (path, number), transform in items:
+            build.add((path or build.root, number), _matrix(transform), 0)
+        remarks = tuple(f"left out its {name}, which are not triangles" for name in sorted(build.ignored))
+        return build.cells.soup(np.concatenate(build.points), remarks)
+
+
+class _Build:
+    """The objects that are built, collected from the parts of an archive."""
+
+    def __init__(self, archive: zipfile.ZipFile) -> None:
+        self._archive = archive
+        self._models: dict[str, _Model] = {}
+        self.root = ""
+        self.cells = SurfaceCells()
+        self.points: list[npt.NDArray[np.float64]] = [np.zeros((0, 3))]
+        self.ignored: set[str] = set()
+        self._n_points = self._n_instances = 0
+
+    def model(self, name: str) -> _Model:
+        """Return a part of the archive; ValueError if it is missing or malformed."""
+        name = name.lstrip("/")
+        if name not in self._models:
+            self._models[name] = _parse_model(_entry(self._archive, name), name)
+            self.ignored |= self._models[name].ignored
+        self.root = self.root or name
+        return self._models[name]
+
+    def add(self, key: tuple[str, str], matrix: npt.NDArray[np.float64], depth: int) -> None:
+        """Add an object, given by its part and number, moved by a matrix (4, 3) that is multiplied from the right."""
+        self._n_instances += 1
+        if depth > _DEEPEST_COMPONENTS or self._n_instances > _MAX_OBJECTS:
+            raise ValueError("malformed: its objects contain each other")
+        found = self.model(key[0]).objects.get(key[1])
+        if found is None:
+            raise ValueError(f"truncated or malformed: it has no object {key[1]!r} in {key[0]}")
+        for (path, number), transform in found.components:
+            self.add((path or key[0], number), _product(_matrix(transform), matrix), depth + 1)
+        if found.faces:
+            points = np.array(found.points, dtype=np.float64).reshape(-1, 3)
+            faces: Integers = np.array(found.faces, dtype=np.int64).reshape(-1, 3)
+            if faces.min() < 0 or faces.max() >= len(points):
+                raise ValueError(f"a triangle of object {key[1]} refers to a point beyond its {len(points)} points")
+            if np.linalg.det(matrix[:3]) < 0.0:
+                faces = faces[:, ::-1]  # a reflection turns triangles inside out
+            self.cells.add("triangle", faces + self._n_points)
+            moved = points if (matrix == np.eye(4, 3)).all() else points @ matrix[:3] + matrix[3]
+            self.points.append(moved)
+            self._n_points += len(points)
+
+
+def _root_name(archive: zipfile.ZipFile) -> str:
+    """Return the name of the part where the model begins."""
+    if "_rels/.rels" in archive.namelist():
+        for element in re.findall(rb"<[\w:]*Relationship\s[^>]*>", _entry(archive, "_rels/.rels")):
+            target = re.search(rb"Target\s*=\s*[\"']([^\"']+)", element)
+            if target and _MODEL_TYPE.encode() in element:
+                return target[1].decode(errors="replace").lstrip("/")
+    return _ROOT
+
+
+def _entry(archive: zipfile.ZipFile, name: str) -> bytes:
+    try:
+        info = archive.getinfo(name)
+        if info.file_size > _LARGEST_SHARE * (info.compress_size + 1):
+            raise ValueError(f"malformed: {name} declares {info.file_size} bytes in {info.compress_size}")
+        return archive.read(info)
+    except KeyError:
+        raise ValueError(f"truncated or malformed: the archive has no {name}") from None
+
+
+def _parse_model(text: bytes, name: str) -> _Model:
+    model = _Model()
+    current = _Object()
+
+    def start(tag: str, attributes: dict[str, str]) -> None:
+        nonlocal current
+        namespace, _, local = tag.rpartition(" ")
+        if namespace != _CORE:
+            if local in ("beamlattice", "booleanshape", "levelset"):
+                model.ignored.add(local)
+            return
+        if local == "vertex":
+            current.points.extend((float(attributes["x"]), float(attributes["y"]), float(attributes["z"])))
+        elif local == "triangle":
+            current.faces.extend((int(attributes["v1"]), int(attributes["v2"]), int(attributes["v3"])))
+        elif local == "object":
+            current = model.objects.setdefault(attributes["id"], _Object())
+        elif local in ("component", "item"):
+            path = next((value for key, value in attributes.items() if key.endswith(" path")), "")
+            placed = (path, attributes["objectid"]), attributes.get("transform", "")
+            (current.components if local == "component" else model.items).append(placed)
+
+    parser = expat.ParserCreate(namespace_separator=" ")
+    parser.StartElementHandler = start
+    try:
+        parser.Parse(text, True)
+    except expat.ExpatError as error:
+        raise ValueError(f"truncated or malformed: {name}: {error}") from None
+    except KeyError as error:
+        raise ValueError(f"malformed: {name}: line {parser.CurrentLineNumber} lacks the attribute {error}") from None
+    return model
+
+
+def _matrix(text: str) -> npt.NDArray[np.float64]:
+    """Return a transformation (4, 3) that is multiplied from the right."""
+    if not text:
+        return np.eye(4, 3)
+    words = text.split()
+    if len(words) != 12:
+        raise ValueError(f"malformed: a transformation has {len(words)} numbers; expected 12")
+    return np.array(list(map(float, words)), dtype=np.float64).reshape(4, 3)
+
+
+def _product(first: npt.NDArray[np.float64], then: npt.NDArray[np.float64]) -> npt.NDArray[np.float64]:
+    product: npt.NDArray[np.float64] = first @ then[:3]
+    product[3] += then[3]
+    return product
+
+
+def threemf_bytes(points: Points, faces: Faces) -> bytes:
+    """Return the content of a 3MF archive of one object, in millimetres, in float64."""
+    vertices = format_rows('<vertex x="%r" y="%r" z="%r"/>\n', points)
+    triangles = format_rows('<triangle v1="%d" v2="%d" v3="%d"/>\n', faces)
+    head = '<?xml version="1.0" encoding="UTF-8"?>\n'
+    mesh = f"<mesh><vertices>\n{vertices}</vertices><triangles>\n{triangles}</triangles></mesh>"
+    model = (
+        f'{head}<model unit="millimeter" xmlns="{_CORE}">\n<resources><object id="1" type="model">{mesh}</object>'
+        '</resources><build><item objectid="1"/></build></model>\n'
+    )
+    types = "http://schemas.openxmlformats.org/package/2006/content-types"
+    relationships = "http://schemas.openxmlformats.org/package/2006/relationships"
+    entries: dict[str, Any] = {
+        "[Content_Types].xml": f'{head}<Types xmlns="{types}">'
+        '<Default Extension="rels" ContentType="application/vnd.openxmlformats-package.relationships+xml"/>'
+        '<Default Extension="model" ContentType="application/vnd.ms-package.3dmanufacturing-3dmodel+xml"/></Types>\n',
+        "_rels/.rels": f'{head}<Relationships xmlns="{relationships}">'
+        f'<Relationship Target="/{_ROOT}" Id="rel0" Type="{_MODEL_TYPE}"/></Relationships>\n',
+        _ROOT: model,
+    }
+    buffer = io.BytesIO()
+    with zipfile.ZipFile(buffer, "w", zipfile.ZIP_DEFLATED) as archive:
+        for name, text in entries.items():
+            archive.writestr(zipfile.ZipInfo(name, _DATE), text, zipfile.ZIP_DEFLATED)
+    return buffer.getvalue()

@@ -1,0 +1,91 @@
+"""The cell types of VTK, in files and in memory. Numbers: https://vtk.org/doc/nightly/html/vtkCellType_8h.html."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+
+from anisomesh.io.cells import N_CORNERS, Shape, SurfaceCells, strip_triangles
+from anisomesh.io.polygons import Integers
+
+TRIANGLE, STRIP, POLYGON, PIXEL, QUAD, QUADRATIC_POLYGON = 5, 6, 7, 8, 9, 36
+
+_N_TYPES = 256  # of one byte
+
+_VTK_SHAPES: dict[int, Shape] = {
+    **dict.fromkeys((TRIANGLE, 22, 34, 61, 69, 76), "triangle"),
+    **dict.fromkeys((PIXEL, QUAD, 23, 28, 30, 62, 70, 77), "quad"),
+}
+_NODES_ON_SIDES = (22, 23, 28, 30, 34, 69, 70)  # the others of higher order have control points or another order
+_VTK_OTHERS = {
+    **dict.fromkeys((0, 1, 2), "vertex"),
+    **dict.fromkeys((3, 4, 21, 35, 51, 60, 68, 75), "line"),
+    **dict.fromkeys((10, 24, 55, 64, 71, 78), "tetra"),
+    **dict.fromkeys((11, 12, 25, 29, 33, 56, 67, 72, 79), "hexahedron"),
+    **dict.fromkeys((13, 26, 31, 32, 65, 73, 80), "wedge"),
+    **dict.fromkeys((14, 27, 37, 66, 74, 81), "pyramid"),
+    **dict.fromkeys((15, 16, 41, 42), "polyhedron"),
+}
+
+
+def add_vtk_cells(
+    cells: SurfaceCells, types: npt.NDArray[Any], connectivity: npt.NDArray[Any], offsets: npt.NDArray[Any]
+) -> None:
+    """Add cells as an unstructured grid of VTK has them.
+
+    Parameters
+    ----------
+    cells
+        The cells are added here.
+    types
+        Type of each cell (n,).
+    connectivity
+        Point indices of all cells, concatenated.
+    offsets
+        End of each cell in ``connectivity`` (n,).
+
+    Raises
+    ------
+    ValueError
+        If offsets are not plausible, a cell has a wrong number of points, or its type is unknown.
+    """
+    types, ends = np.asarray(types, dtype=np.int64), np.asarray(offsets, dtype=np.int64)
+    sizes = np.diff(ends, prepend=0)
+    if len(types) != len(ends) or (sizes < 0).any() or (len(ends) and ends[-1] > len(connectivity)):
+        raise ValueError("malformed: the offsets of the cells do not fit their points and types")
+    unknown = np.flatnonzero((types < 0) | (types >= _N_TYPES))
+    if len(unknown):
+        raise ValueError(f"malformed: cell {unknown[0]} is of type {types[unknown[0]]}; expected 0 to {_N_TYPES - 1}")
+    connectivity = np.asarray(connectivity, dtype=np.int64)
+    source = cells.take_numbers(len(types))
+    kind = sizes * _N_TYPES + types
+    for key in np.unique(kind).tolist():
+        size, cell_type = divmod(key, _N_TYPES)
+        chosen = np.flatnonzero(kind == key)
+        if cell_type in _VTK_OTHERS:
+            cells.ignore(_VTK_OTHERS[cell_type], len(chosen))
+        else:
+            nodes = connectivity[(ends[chosen] - size)[:, None] + np.arange(size)]
+            _add_surface_cells(cells, cell_type, nodes, source[chosen])
+
+
+def _add_surface_cells(cells: SurfaceCells, cell_type: int, nodes: Integers, source: Integers) -> None:
+    n, size = nodes.shape
+    if cell_type == STRIP:
+        triangles = [strip_triangles(strip) for strip in nodes]
+        numbers = np.repeat(source, [len(rows) for rows in triangles])
+        cells.add("triangle", np.concatenate(triangles), numbers)
+    elif cell_type == POLYGON:
+        cells.add_polygons(nodes.ravel(), np.full(n, size), source)
+    elif cell_type == QUADRATIC_POLYGON:
+        cells.add_polygons(nodes[:, : size // 2].ravel(), np.full(n, size // 2), source, higher_order=True)
+    elif cell_type in _VTK_SHAPES:
+        shape = _VTK_SHAPES[cell_type]
+        if size < N_CORNERS[shape]:
+            raise ValueError(f"malformed: cell {source[0]} of type {cell_type} has {size} points")
+        nodes = nodes[:, [0, 1, 3, 2]] if cell_type == PIXEL and size == 4 else nodes
+        cells.add(shape, nodes, source, nodes_on_sides=cell_type in _NODES_ON_SIDES)
+    else:
+        raise ValueError(f"cell {source[0]} is of type {cell_type}, which is not known; convert it to triangles")
