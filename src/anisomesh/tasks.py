@@ -22,7 +22,7 @@ from anisomesh.mesh.closest_points import ClosestPoints
 from anisomesh.mesh.embedded_surface import EmbeddedSurface
 from anisomesh.mesh.geometry import Frame, unit_frame
 from anisomesh.mesh.surface import Surface
-from anisomesh.mesh.working_surface import WorkingSurface, working_surface
+from anisomesh.mesh.working_surface import working_surface
 from anisomesh.metric.field import MetricField, checked_field
 from anisomesh.metric.narrow_patches import limit_to_patches
 from anisomesh.metric.thin_walls import separate_thin_walls
@@ -91,6 +91,7 @@ def set_up(source: PreparedInput, n: int, options: RemeshOptions, run: Run, *, n
         working = split.surface
         if field.points is not None:
             working = working.with_points(field.points)
+            tagged = split.coarse_tagged
             surface = split.coarse.with_points(field.points[: split.coarse.n_points])
         field = limit_to_patches(field, working, n)
     with run.stage("embed"):
@@ -108,7 +109,7 @@ def set_up(source: PreparedInput, n: int, options: RemeshOptions, run: Run, *, n
         )
         plan = fit_plan(options, surface, nearest=nearest)
         metric, prescribed = PlacedMetric(ClosestPoints(working), field), bool(source.tagged.any())
-        target = None if plan is None else _fit_target(task, split, metric, plan, options, prescribed=prescribed)
+        target = None if plan is None else _fit_target(task, tagged, metric, plan, options, prescribed=prescribed)
     return Tasks(
         options=options,
         frame=frame,
@@ -140,14 +141,14 @@ def _with_smooth_borders(
 
 def _fit_target(
     task: MeshingTask,
-    split: WorkingSurface,
+    tagged: EdgeMask,
     metric: PlacedMetric,
     plan: FitPlan,
     options: RemeshOptions,
     *,
     prescribed: bool,
 ) -> FitTarget:
-    """Return what meshes are fitted to.
+    """Return what meshes are fitted to, with ``tagged`` edges (E,) of the surface to mesh.
 
     If edges are ``prescribed`` by a user all creases are held, else only borders and seams.
     """
@@ -160,7 +161,7 @@ def _fit_target(
         crease_angle=options.feature_angle,
         plan=plan,
     )
-    return replace(target, lines=split.coarse.edges[split.coarse_tagged].astype(np.int64))
+    return replace(target, lines=task.surface.edges[tagged].astype(np.int64))
 
 
 def _features(

@@ -88,6 +88,14 @@ def test_a_decimation_keeps_the_borders_of_regions(divided_box):
     np.testing.assert_allclose(areas(result.surface, result.mesh.regions["group"].labels), expected, atol=1e-9)
 
 
+def test_a_border_is_held_where_short_edges_of_the_input_are_collapsed():
+    plate = box((2.0, 1.0, 0.2), n=8)
+    labels = sides_of(plate)
+    labels[(labels == 2) & (plate.points[plate.faces][..., 0].mean(axis=1) > 1.0)] = 6
+    result = anisomesh.remesh(Mesh(surface=plate, regions={"r": Regions(labels)}), n_vertices=100)
+    np.testing.assert_allclose(areas(result.surface, result.mesh.regions["r"].labels), areas(plate, labels), atol=1e-9)
+
+
 def test_faces_that_the_repair_reverses_keep_what_they_carry(divided_box):
     mesh, _ = divided_box
     reversed_faces = np.arange(BOX.n_faces) % 5 == 0
