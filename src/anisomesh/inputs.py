@@ -98,7 +98,7 @@ def prepared_input(mesh: Mesh, options: RemeshOptions) -> PreparedInput:
             raise OptionError(
                 f"density[{where}] = {value:g}; expected a positive weight for each point, below {_LARGEST_DENSITY:g}"
             )
-    prescribed = [pairs for pairs in (options.features, mesh.features) if pairs is not None]
+    prescribed = [mesh.features, *([] if options.features is None else [options.features])]
     borders, seams = _borders(mesh, prepared.surface, options)
     return PreparedInput(
         prepared=prepared,
@@ -117,8 +117,7 @@ def _tagged(
     """Return the edges (E,) of the prepared surface that are in any of some lists of edges of the input (n, 2)."""
     tagged = np.zeros(len(prepared.edges), dtype=bool)
     for pairs in prescribed:
-        if np.size(pairs):
-            tagged |= tagged_edges(surface, pairs, prepared, options.weld_tolerance)
+        tagged |= tagged_edges(surface, pairs, prepared, options.weld_tolerance)
     return tagged
 
 
