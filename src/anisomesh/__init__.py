@@ -13,6 +13,8 @@ import importlib
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
+    from anisomesh.attributes.model import Mesh, Regions
+    from anisomesh.attributes.transfer import transfer_attributes
     from anisomesh.conformance import ConformanceError, check_embedder, check_energy_gradient, check_metric_source
     from anisomesh.cvt.energy import NormalMetric
     from anisomesh.cvt.polygon_energy import energy_from_kernel
@@ -25,15 +27,12 @@ if TYPE_CHECKING:
     from anisomesh.evaluation.report import Evaluation, evaluate
     from anisomesh.execution.progress import StepInfo
     from anisomesh.features.network import trace_features
-    from anisomesh.fitting.target import FitTarget
-    from anisomesh.fitting.valid import fit_without_faults
     from anisomesh.io.meshes import load, save
     from anisomesh.learn.inference.source import Hybrid, Neural
     from anisomesh.mesh.embedded_surface import EmbeddedSurface
     from anisomesh.mesh.surface import Surface
     from anisomesh.metric.field import MetricField
     from anisomesh.metric.sources import Approximation, Curvature, Uniform
-    from anisomesh.metric.transfer import PlacedMetric
     from anisomesh.options import RemeshOptions
     from anisomesh.pipeline import remesh
     from anisomesh.repair.prepare import prepare
@@ -52,6 +51,9 @@ _MODULE_OF = {
     "StepInfo": "execution.progress",
     # meshes in and out, judged and drawn
     "Surface": "mesh.surface",
+    "Mesh": "attributes.model",
+    "Regions": "attributes.model",
+    "transfer_attributes": "attributes.transfer",
     "load": "io.meshes",
     "save": "io.meshes",
     "save_rvd": "result",
@@ -80,9 +82,6 @@ _MODULE_OF = {
     "optimise_sites": "cvt.schedule",
     "MeshingTask": "delaunay.meshing",
     "mesh_from_sites": "delaunay.meshing",
-    "PlacedMetric": "metric.transfer",
-    "FitTarget": "fitting.target",
-    "fit_without_faults": "fitting.valid",
     # conformance tests of plug-ins
     "check_metric_source": "conformance",
     "check_embedder": "conformance",
@@ -107,8 +106,8 @@ __all__ = [
     "Embedding",
     "EnergyValue",
     "Evaluation",
-    "FitTarget",
     "Hybrid",
+    "Mesh",
     "MeshError",
     "MeshFileError",
     "MeshingTask",
@@ -117,7 +116,7 @@ __all__ = [
     "Neural",
     "NormalMetric",
     "OptionError",
-    "PlacedMetric",
+    "Regions",
     "RemeshOptions",
     "RemeshResult",
     "RestrictedVoronoi",
@@ -130,7 +129,6 @@ __all__ = [
     "check_metric_source",
     "energy_from_kernel",
     "evaluate",
-    "fit_without_faults",
     "load",
     "mesh_from_sites",
     "optimise_sites",
@@ -142,6 +140,7 @@ __all__ = [
     "save_rvd",
     "side_by_side",
     "trace_features",
+    "transfer_attributes",
 ]
 
 

@@ -11,7 +11,9 @@ from typing import Any
 
 import numpy.typing as npt
 
-from anisomesh.caveats import caveats, losses_of_repair, losses_of_shape, unfollowed_sizes
+from anisomesh.attributes.model import Mesh
+from anisomesh.attributes.transfer import oriented_as, transfer_attributes
+from anisomesh.caveats import caveats, losses_of_attributes, losses_of_repair, losses_of_shape, unfollowed_sizes
 from anisomesh.counts.search import smallest_within
 from anisomesh.cvt.lbfgs import Optimised
 from anisomesh.cvt.schedule import DualFeedback, optimise_sites
@@ -62,8 +64,9 @@ def remesh(
     Parameters
     ----------
     mesh
-        The name of a mesh file; points (V, 3) together with ``faces``; or what
-        :func:`~anisomesh.io.convert.as_surface` takes.
+        The name of a mesh file; points (V, 3) together with ``faces``; what
+        :func:`~anisomesh.io.convert.as_surface` takes; or a :class:`Mesh`, of which the result has everything in its
+        ``mesh``.
     faces
         Triangles (F, 3), if the first argument is an array of points.
     n_vertices
@@ -107,10 +110,13 @@ def remesh(
         raise OptionError(f"on_step = {on_step!r}; expected a function of a StepInfo")
     run = Run(on_step or ignore_steps, deadline)
     n_vertices, ratio, max_error = read_target(n_vertices, ratio, max_error, options)
-    with run.stage("load") if isinstance(mesh, str | os.PathLike) else nullcontext():
-        surface = surface_of(mesh, faces)
+    if isinstance(mesh, Mesh) and faces is None:
+        given = mesh
+    else:
+        with run.stage("load") if isinstance(mesh, str | os.PathLike) else nullcontext():
+            given = Mesh(surface=surface_of(mesh, faces))
     with run.stage("prepare"):
-        source = prepared_input(surface, options)
+        source = prepared_input(given, options)
     prepared = source.prepared.surface
     if max_error is not None:
         options = replace(options, denoise=False)  # the distance asked for refers to the input itself
@@ -119,12 +125,25 @@ def remesh(
             run.on_step(StepInfo(stage="search", message=f"{n:,} vertices"))
             return _remesh(source, n, options, run, nearest=True)
 
-        return smallest_within(with_vertices, prepared, max_error, deadline)
-    if ratio is not None:
-        n_vertices = max(MIN_VERTICES, round(ratio * prepared.n_points))
-    if n_vertices is None:
-        return _remesh(source, count_for_length(source, options, run), options, run, asked=options.absolute_length)
-    return _remesh(source, n_vertices, options, run)
+        result = smallest_within(with_vertices, prepared, max_error, deadline)
+    elif n_vertices is None and ratio is None:
+        n = count_for_length(source, options, run)
+        result = _remesh(source, n, options, run, asked=options.absolute_length)
+    else:
+        n = n_vertices or max(MIN_VERTICES, round((ratio or 0.0) * prepared.n_points))
+        result = _remesh(source, n, options, run)
+    return _with_attributes(result, given, run) if options.attributes else result
+
+
+def _with_attributes(result: RemeshResult, given: Mesh, run: Run) -> RemeshResult:
+    """Return a result with everything that a mesh carries."""
+    if given.is_bare:
+        return result
+    with run.stage("attributes"):
+        source = oriented_as(given, result.prepared) if result.prepare_report.faces_flipped else given
+        mesh = transfer_attributes(source, result.surface)
+    warnings = (*result.warnings, *losses_of_attributes(given, mesh))
+    return replace(result, mesh=mesh, seconds=run.total_seconds(), warnings=warnings)
 
 
 def _remesh(
@@ -148,8 +167,10 @@ def _remesh(
     made = _valid_mesh(task, tasks.fit, tasks.options, run)
     mesh, optimised, validity = made.mesh, made.optimised, made.validity
     agreement = _agreement(mesh, tasks, asked) if asked or task.error_weights is not None else None
+    surface = Surface(frame.to_model(mesh.points), mesh.faces)
     return RemeshResult(
-        surface=Surface(frame.to_model(mesh.points), mesh.faces),
+        surface=surface,
+        mesh=Mesh(surface=surface),
         prepared=prepared.surface,
         prepare_report=prepared.report,
         working=task.voronoi.embedded.surface,
@@ -171,6 +192,7 @@ def _remesh(
         seconds=run.total_seconds(),
         warnings=(
             *losses_of_repair(prepared.report),
+            *tasks.remarks,
             *field.remarks,
             *losses_of_shape(
                 tasks.surface, Surface(mesh.points, mesh.faces), task.corner_places, made.feature_distance

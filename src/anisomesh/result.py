@@ -8,6 +8,7 @@ from math import isfinite
 from typing import Any
 
 from anisomesh._arrays import CornerTensors, PointTensors, Sites
+from anisomesh.attributes.model import Mesh
 from anisomesh.cvt.lbfgs import Status
 from anisomesh.embedding.base import Embedding
 from anisomesh.io.describe import html_table, soundness
@@ -30,6 +31,8 @@ class RemeshResult:
     ----------
     surface
         The result, in model units.
+    mesh
+        The same with everything that the input carries, see :func:`~anisomesh.attributes.transfer.transfer_attributes`.
     prepared
         The input after repair, in model units.
     prepare_report
@@ -64,8 +67,8 @@ class RemeshResult:
     distance
         Largest distance between result and input, both ways, in model units; None unless ``max_error`` was given.
     feature_distance
-        Largest distance from the edges in ``features`` to edges of the result that follow them, in model units; 0
-        without such edges, infinite if they are lost.
+        Largest distance from the edges in ``features``, and the borders of regions and seams that are followed, to
+        edges of the result that follow them, in model units; 0 without such edges, infinite if they are lost.
     conformity
         How well the edges have the lengths asked for; None unless ``edge_length``, ``size_field`` or a metric of the
         user prescribes them.
@@ -76,6 +79,7 @@ class RemeshResult:
     """
 
     surface: Surface
+    mesh: Mesh
     prepared: Surface
     prepare_report: PrepareReport
     working: Surface

@@ -11,7 +11,7 @@ from dataclasses import dataclass
 import numpy as np
 import numpy.typing as npt
 
-from anisomesh._arrays import EdgeMask, PointLabels
+from anisomesh._arrays import EdgeMask, PointLabels, PointMask
 from anisomesh.mesh.delaunay_refinement import Refinement, refine_slivers
 from anisomesh.mesh.geometry import even_edge_length
 from anisomesh.mesh.marked_surface import MarkedSurface
@@ -45,13 +45,14 @@ class WorkingSurface:
         The surface; its first points are the points of ``coarse``, unchanged.
     tagged
         Which of its edges (E',) are parts of tagged edges.
-    coarse
-        The input without short edges; the input itself if it has none.
+    coarse, coarse_tagged
+        The input without short edges, itself if it has none, and which of its edges (E'',) are parts of tagged edges.
     """
 
     surface: Surface
     tagged: EdgeMask
     coarse: Surface
+    coarse_tagged: EdgeMask
     _kept: PointLabels
     _refinement: Refinement
     _trimmed: PointLabels
@@ -60,6 +61,10 @@ class WorkingSurface:
     def interpolate(self, values: npt.NDArray[np.float64]) -> npt.NDArray[np.float64]:
         """Interpolate values (V, ...) at the points of the input linearly to all points (V', ...)."""
         return self._subdivision.interpolate(self._refinement.interpolate(values[self._kept])[self._trimmed])
+
+    def on_coarse(self, mask: PointMask) -> PointMask:
+        """Return a mask of points of the input (V,) as a mask of the points of ``coarse``."""
+        return np.asarray(mask[self._kept])
 
 
 def working_surface(surface: Surface, n_vertices: int, *, creases: EdgeMask, tagged: EdgeMask) -> WorkingSurface:
@@ -102,6 +107,7 @@ def working_surface(surface: Surface, n_vertices: int, *, creases: EdgeMask, tag
         surface=subdivision.surface,
         tagged=edges_within(subdivision, refined, trimmed.marked.labels == _TAGGED),
         coarse=coarsening.surface,
+        coarse_tagged=coarsening.marked.labels == _TAGGED,
         _kept=coarsening.kept,
         _refinement=refinement,
         _trimmed=trimmed.kept,

@@ -9,11 +9,12 @@ from typing import Any, cast
 
 import numpy as np
 
-from anisomesh._arrays import PointMask, PointTensors, real_array
+from anisomesh._arrays import EdgeMask, PointMask, PointTensors, real_array
 from anisomesh.errors import OptionError
 from anisomesh.execution.memory import check_memory
 from anisomesh.execution.run import Run
 from anisomesh.features.detect import WEAK_ANGLE, apexes, sharp_edges
+from anisomesh.features.smooth_lines import with_smooth_lines
 from anisomesh.mesh.geometry import Frame, unit_frame
 from anisomesh.mesh.surface import Surface
 from anisomesh.mesh.working_surface import WorkingSurface, working_surface
@@ -22,7 +23,7 @@ from anisomesh.metric.field import MetricField, checked_field
 from anisomesh.metric.narrow_patches import limit_to_patches
 from anisomesh.metric.sizes import checked_sizes, limited_sizes, metric_of_sizes
 from anisomesh.options import MIN_VERTICES, RemeshOptions
-from anisomesh.resolve import metric_source, with_embedding_chosen
+from anisomesh.resolve import follows_creases, is_designed, metric_source, with_embedding_chosen
 from anisomesh.setup.inputs import PreparedInput
 
 logger = logging.getLogger(__name__)
@@ -43,21 +44,27 @@ class Measured:
         From model units to bounding-box diagonal 1.
     surface
         The surface that the mesh is to approximate, at bounding-box diagonal 1.
+    tagged
+        Which of its edges (E,) are prescribed, or borders and seams that are followed.
     split, working
         The surface that is embedded: how it comes about, and itself, its noise removed.
     tips
-        Which points of the surface are apexes.
+        Which points of the surface are apexes, or fixed.
     field
         The metric on the working surface.
+    remarks
+        What a user should know, one sentence each.
     """
 
     options: RemeshOptions
     frame: Frame
     surface: Surface
+    tagged: EdgeMask
     split: WorkingSurface
     tips: PointMask
     working: Surface
     field: MetricField
+    remarks: tuple[str, ...]
 
 
 def count_for_length(source: PreparedInput, options: RemeshOptions, run: Run) -> int:
@@ -92,9 +99,14 @@ def measure(source: PreparedInput, n: int, options: RemeshOptions, run: Run) -> 
         frame = unit_frame(prepared.surface.points)
         surface = prepared.surface.with_points(frame.to_unit(prepared.surface.points))
         options = with_embedding_chosen(options, surface)
+        tagged, remarks = source.features_at(n)
+        surface, tagged = _with_smooth_borders(surface, source, tagged, options.feature_angle)
         creases = sharp_edges(surface, min(options.feature_angle, WEAK_ANGLE))
-        split = working_surface(surface, n, creases=creases, tagged=source.tagged)
-        tips = apexes(split.coarse, sharp_edges(split.coarse, options.feature_angle))
+        creases |= source.fixed[surface.edges].any(axis=1)  # so that the points stay
+        split = working_surface(surface, n, creases=creases, tagged=tagged)
+        tips = split.on_coarse(source.fixed)
+        if follows_creases(options):
+            tips |= apexes(split.coarse, sharp_edges(split.coarse, options.feature_angle))
         check_memory(n, split.surface.n_faces)
         logger.info("working surface: %r; embedding: %s", split.surface, options.embedding)
     with run.stage("metric"):
@@ -103,9 +115,37 @@ def measure(source: PreparedInput, n: int, options: RemeshOptions, run: Run) -> 
         working = split.surface
         if field.points is not None:
             working = working.with_points(field.points)
+            tagged = split.coarse_tagged
             surface = split.coarse.with_points(field.points[: split.coarse.n_points])
         field = limit_to_patches(field, working, n)
-    return Measured(options=options, frame=frame, surface=surface, split=split, tips=tips, working=working, field=field)
+    return Measured(
+        options=options,
+        frame=frame,
+        surface=surface,
+        tagged=tagged,
+        split=split,
+        tips=tips,
+        working=working,
+        field=field,
+        remarks=remarks,
+    )
+
+
+def _with_smooth_borders(
+    surface: Surface, source: PreparedInput, followed: EdgeMask, crease_angle: float
+) -> tuple[Surface, EdgeMask]:
+    """Return a surface with smoother borders and seams among the edges (E,) that are followed, and these edges.
+
+    On a scan they go around triangles, which are smaller than the ones of the result; designed surfaces stay.
+    """
+    lines = followed & ~source.tagged
+    if not lines.any() or is_designed(surface):
+        return surface, followed
+    creases = sharp_edges(surface, crease_angle)
+    fixed = surface.on_boundary | source.fixed
+    fixed[surface.edges[source.tagged | creases]] = True
+    surface, (lines, tagged, _) = with_smooth_lines(surface, lines, (source.tagged, creases), fixed)
+    return surface, lines | tagged
 
 
 def _prescribed(

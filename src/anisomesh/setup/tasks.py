@@ -52,6 +52,8 @@ class Tasks:
         The task to make a mesh from sites.
     fit
         What that mesh is fitted to, None if it is not.
+    remarks
+        What a user should know, one sentence each.
     """
 
     options: RemeshOptions
@@ -62,6 +64,7 @@ class Tasks:
     embedding: Embedding
     dual: MeshingTask
     fit: FitTarget | None
+    remarks: tuple[str, ...]
 
 
 def set_up(source: PreparedInput, n: int, options: RemeshOptions, run: Run, *, nearest: bool) -> Tasks:
@@ -92,7 +95,10 @@ def set_up(source: PreparedInput, n: int, options: RemeshOptions, run: Run, *, n
         )
         plan = fit_plan(options, surface, nearest=nearest)
         metric = PlacedMetric(ClosestPoints(working), field if weights is None else asked)
-        target = None if plan is None else _fit_target(task, metric, plan, options.feature_angle)
+        prescribed = bool(source.tagged.any())
+        target = None
+        if plan is not None:
+            target = _fit_target(task, measured.tagged, metric, plan, options, prescribed=prescribed)
     return Tasks(
         options=options,
         frame=measured.frame,
@@ -102,6 +108,7 @@ def set_up(source: PreparedInput, n: int, options: RemeshOptions, run: Run, *, n
         embedding=embedding,
         dual=task,
         fit=target,
+        remarks=measured.remarks,
     )
 
 
@@ -120,27 +127,38 @@ def _given(field: MetricField) -> PointTensors | CornerTensors:
     return field.tensors if field.corner_tensors is None else field.corner_tensors
 
 
-def _fit_target(task: MeshingTask, metric: PlacedMetric, plan: FitPlan, crease_angle: float) -> FitTarget:
-    """Return what meshes are fitted to."""
-    return FitTarget.of(
+def _fit_target(
+    task: MeshingTask,
+    tagged: EdgeMask,
+    metric: PlacedMetric,
+    plan: FitPlan,
+    options: RemeshOptions,
+    *,
+    prescribed: bool,
+) -> FitTarget:
+    """Return what meshes are fitted to, with ``tagged`` edges (E,) of the surface to mesh.
+
+    If edges are ``prescribed`` by a user all creases are held, else only borders and seams.
+    """
+    target = FitTarget.of(
         task.reference,
         metric,
         task.n_vertices,
         corners=task.corner_places,
-        holds_creases=bool(task.features.required.any()),
-        crease_angle=crease_angle,
+        holds_creases=prescribed and bool(task.features.required.any()),
+        crease_angle=options.feature_angle,
         plan=plan,
     )
+    return replace(target, lines=task.surface.edges[tagged].astype(np.int64))
 
 
 def _features(
     embedded: EmbeddedSurface, n: int, tagged: EdgeMask, tips: PointMask, options: RemeshOptions
 ) -> FeatureNetwork:
-    """Return boundary, creases and apexes; with the plain CVT only the tagged edges.
+    """Return boundary, creases and apexes; with the plain CVT only the tagged edges and the tips.
 
-    ``tagged`` are edges (E,) of the embedded surface, and ``tips`` the apexes among its first points.
+    ``tagged`` are edges (E,) of the embedded surface, and ``tips`` apexes and fixed points among its first points.
     """
     angle = options.feature_angle if follows_creases(options) else 180.0
     sharp = sharp_edges(embedded.surface, angle) | tagged
-    apex = np.flatnonzero(tips & follows_creases(options))
-    return trace_features(embedded, n, sharp=sharp, required=tagged, apexes=apex)
+    return trace_features(embedded, n, sharp=sharp, required=tagged, apexes=np.flatnonzero(tips))
