@@ -106,6 +106,17 @@ REMESH_OPTIONS: dict[str, Any] = {
         bool,
         _option("--denoise/--keep-noise", help="Remove noise that is found in a scan, or keep it."),
     ],
+    "regions": Annotated[
+        bool,
+        _option(
+            "--regions/--no-regions",
+            help="Follow the borders between regions of the input, or only what is sharp or prescribed.",
+        ),
+    ],
+    "attributes": Annotated[
+        bool,
+        _option("--attributes/--no-attributes", help="Carry over all that the input file has, or its shape only."),
+    ],
     "fit": Annotated[
         bool,
         _option("--fit/--no-fit", help="Fit the mesh to the input at the end, or leave the dual of the tessellation."),

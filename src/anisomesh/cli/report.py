@@ -17,7 +17,7 @@ _METRIC_SOURCES = {
     "neural": "neural (metric predicted by a network)",
     "hybrid": "hybrid (mean of the measured and the predicted metric)",
 }
-_STAGE_ORDER = ("load", "prepare", "metric", "embed", "cvt", "dual", "fit")
+_STAGE_ORDER = ("load", "prepare", "metric", "embed", "cvt", "dual", "fit", "attributes")
 
 
 def as_json(report: dict[str, Any]) -> str:
