@@ -8,6 +8,7 @@ import numpy as np
 from scipy.spatial import cKDTree
 
 from anisomesh._arrays import Points
+from anisomesh.attributes.model import Mesh
 from anisomesh.cvt.lbfgs import Optimised, Status
 from anisomesh.delaunay.meshing import ValidMesh
 from anisomesh.mesh.surface import Surface
@@ -57,6 +58,18 @@ def losses_of_shape(
         change = abs(after - before) / abs(before)
         word = "larger" if abs(after) > abs(before) else "smaller"
         yield f"the enclosed volume is {change:.0%} {word} than before; ask for more vertices"
+
+
+def losses_of_attributes(before: Mesh, after: Mesh) -> Iterator[str]:
+    """Yield one sentence for everything that a mesh carries in another form than the mesh it was made from, or not."""
+    moved = sorted(set(after.corner_data) - set(before.corner_data))
+    if moved:
+        names = ", ".join(moved)
+        yield f"point data with different values at coincident points are corner data of the result: {names}"
+    n = len(np.unique(before.surface.points[before.fixed_points], axis=0))
+    lost = n - len(after.fixed_points)
+    if lost > 0:
+        yield f"{lost:,} of {n:,} fixed points are no points of the result; ask for more vertices"
 
 
 def caveats(

@@ -2,20 +2,27 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 import numpy.typing as npt
 
-from anisomesh._arrays import EdgeMask, PointScalars, PointTensors, real_array
+from anisomesh._arrays import EdgeMask, PointMask, PointScalars, PointTensors, real_array
+from anisomesh.attributes.charts import Joints, with_seams_at_corners
+from anisomesh.attributes.model import Mesh
 from anisomesh.errors import MetricError, OptionError
-from anisomesh.features.tagged import tagged_edges
+from anisomesh.features.detect import sharp_edges
+from anisomesh.features.tagged import tagged_edges, tagged_points
+from anisomesh.mesh.geometry import even_edge_length
 from anisomesh.mesh.surface import Surface
 from anisomesh.metric.tensors import validate_metric
 from anisomesh.options import RemeshOptions
 from anisomesh.repair.prepare import Prepared, prepare
+from anisomesh.resolve import follows_creases, is_designed
 
+_MAX_BORDER_SHARE = 0.4  # of the vertices asked for, that borders and seams may take; heuristic
 _LARGEST_DENSITY = 1e30  # and inverse of the smallest, so that energies are far from overflow
 
 
@@ -31,16 +38,41 @@ class PreparedInput:
         Metric (V, 3, 3) and density (V,) at its points, None if they are not prescribed.
     tagged
         Which of its edges (E,) are features in any case.
+    borders, seams
+        Which of its edges (E,) are smooth borders between regions, and smooth seams of corner data. Edges of the result
+        follow them where there are enough vertices.
+    fixed
+        Which of its points (V,) stay.
     """
 
     prepared: Prepared
     tensors: PointTensors | None
     density: PointScalars | None
     tagged: EdgeMask
+    borders: EdgeMask
+    seams: EdgeMask
+    fixed: PointMask
+
+    def features_at(self, n_vertices: int) -> tuple[EdgeMask, tuple[str, ...]]:
+        """Return the edges (E,) to follow with a number of vertices, and what has to be said about the others.
+
+        Borders and then seams are followed as long as vertices on them, at the distance of even ones, are not more than
+        a share of all.
+        """
+        surface = self.prepared.surface
+        spacing = even_edge_length(surface.area, n_vertices)
+        followed, remarks = self.tagged.copy(), []
+        for what, edges in (("borders between regions", self.borders), ("seams of corner data", self.seams)):
+            needed = float(surface.edge_lengths[edges | followed].sum()) / spacing
+            if edges.any() and needed > _MAX_BORDER_SHARE * n_vertices:
+                remarks.append(f"edges do not follow all {what}, which would take about {needed:,.0f} vertices")
+            else:
+                followed |= edges
+        return followed, tuple(remarks)
 
 
-def prepared_input(surface: Surface, options: RemeshOptions) -> PreparedInput:
-    """Return the prepared surface and what the options say of its points and edges.
+def prepared_input(mesh: Mesh, options: RemeshOptions) -> PreparedInput:
+    """Return the prepared surface of a mesh, and what the mesh and the options say of its points and edges.
 
     Raises
     ------
@@ -51,6 +83,7 @@ def prepared_input(surface: Surface, options: RemeshOptions) -> PreparedInput:
     OptionError
         If densities are not positive, one per point, or features are not edges of the input.
     """
+    surface = mesh.surface
     prepared = prepare(surface, weld_tolerance=options.weld_tolerance)
     tensors = density = None
     if not isinstance(options.metric, str) and not callable(options.metric):
@@ -64,10 +97,48 @@ def prepared_input(surface: Surface, options: RemeshOptions) -> PreparedInput:
             raise OptionError(
                 f"density[{where}] = {value:g}; expected a positive weight for each point, below {_LARGEST_DENSITY:g}"
             )
-    tagged = np.zeros(len(prepared.surface.edges), dtype=bool)
-    if options.features is not None:
-        tagged = tagged_edges(surface, options.features, prepared.surface, options.weld_tolerance)
-    return PreparedInput(prepared=prepared, tensors=tensors, density=density, tagged=tagged)
+    prescribed = [pairs for pairs in (options.features, mesh.features) if pairs is not None]
+    borders, seams = _borders(mesh, prepared.surface, options)
+    return PreparedInput(
+        prepared=prepared,
+        tensors=tensors,
+        density=density,
+        tagged=_tagged(prescribed, surface, prepared.surface, options),
+        borders=borders,
+        seams=seams,
+        fixed=tagged_points(surface, mesh.fixed_points, prepared.surface, options.weld_tolerance),
+    )
+
+
+def _tagged(
+    prescribed: Sequence[npt.ArrayLike], surface: Surface, prepared: Surface, options: RemeshOptions
+) -> EdgeMask:
+    """Return the edges (E,) of the prepared surface that are in any of some lists of edges of the input (n, 2)."""
+    tagged = np.zeros(len(prepared.edges), dtype=bool)
+    for pairs in prescribed:
+        if np.size(pairs):
+            tagged |= tagged_edges(surface, pairs, prepared, options.weld_tolerance)
+    return tagged
+
+
+def _borders(mesh: Mesh, prepared: Surface, options: RemeshOptions) -> tuple[EdgeMask, EdgeMask]:
+    """Return the smooth borders between regions of a mesh, and the smooth seams of its corner data, as edges (E,).
+
+    Sharp ones of designed surfaces are followed anyway.
+    """
+    borders, seams = np.zeros((2, len(prepared.edges)), dtype=bool)
+    if not options.attributes or not options.regions or not (mesh.regions or mesh.corner_data or mesh.point_data):
+        return borders, seams
+    joints = Joints(mesh.surface)
+    lines = [joints.region_borders(mesh.parts)] if mesh.regions else []
+    borders = _tagged(lines, mesh.surface, prepared, options)
+    corner_data = with_seams_at_corners(mesh, joints).corner_data
+    lines = [joints.seams(joints.continuous(values)) for values in corner_data.values()]
+    seams = _tagged(lines, mesh.surface, prepared, options) & ~borders
+    if follows_creases(options) and is_designed(prepared):
+        smooth = ~sharp_edges(prepared, options.feature_angle)
+        borders, seams = borders & smooth, seams & smooth
+    return borders, seams
 
 
 def _at_prepared(

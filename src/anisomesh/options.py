@@ -91,6 +91,11 @@ class RemeshOptions:
         plain CVT (``sharpness`` 1) does not follow them.
     features
         Edges of the input that are creases in any case, as pairs of its points (n, 2).
+    regions
+        Whether edges of the result follow the borders between regions of a :class:`~anisomesh.attributes.model.Mesh`
+        and the seams of its corner data, also where the surface is smooth.
+    attributes
+        Whether the result has everything that a :class:`~anisomesh.attributes.model.Mesh` carries.
     time_limit
         Wall-clock seconds after which the optimisation and the repair of faults end with what they have; the first
         60 % are for the optimisation. What a valid mesh needs is done regardless, so a run may take somewhat longer.
@@ -115,6 +120,8 @@ class RemeshOptions:
     weld_tolerance: float | Literal["auto"] = 0.0
     feature_angle: float = 40.0
     features: npt.ArrayLike | None = None
+    regions: bool = True
+    attributes: bool = True
     time_limit: float | None = None
 
     def __post_init__(self) -> None:
@@ -133,7 +140,7 @@ class RemeshOptions:
             raise OptionError(f"time_limit = {self.time_limit}; expected a positive number of seconds")
         if self.threads > MAX_THREADS:
             raise OptionError(f"threads = {self.threads}; expected at most {MAX_THREADS}")
-        for name in ("denoise", "fit"):
+        for name in ("denoise", "fit", "regions", "attributes"):
             if not isinstance(getattr(self, name), bool):
                 raise OptionError(f"{name} = {getattr(self, name)!r}; expected True or False")
         if not isinstance(self.weights, str | os.PathLike | None):

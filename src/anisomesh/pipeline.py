@@ -7,7 +7,9 @@ from typing import Any
 
 import numpy.typing as npt
 
-from anisomesh.caveats import caveats, losses_of_repair, losses_of_shape
+from anisomesh.attributes.model import Mesh
+from anisomesh.attributes.transfer import oriented_as, transfer_attributes
+from anisomesh.caveats import caveats, losses_of_attributes, losses_of_repair, losses_of_shape
 from anisomesh.cvt.lbfgs import Optimised
 from anisomesh.cvt.schedule import DualFeedback, optimise_sites
 from anisomesh.delaunay.creases import missing_on_creases
@@ -53,7 +55,8 @@ def remesh(
     Parameters
     ----------
     mesh
-        Points (V, 3) together with ``faces``, or what :func:`~anisomesh.io.convert.as_surface` takes.
+        Points (V, 3) together with ``faces``, or what :func:`~anisomesh.io.convert.as_surface` takes; or a
+        :class:`Mesh`, of which the result has everything in its ``mesh``.
     faces
         Triangles (F, 3), if the first argument is an array of points.
     n_vertices
@@ -93,10 +96,10 @@ def remesh(
     if on_step is not None and not callable(on_step):
         raise OptionError(f"on_step = {on_step!r}; expected a function of a StepInfo")
     run = Run(on_step or ignore_steps, deadline)
-    surface = as_surface(mesh, faces)
+    given = mesh if isinstance(mesh, Mesh) and faces is None else Mesh(surface=as_surface(mesh, faces))
     n_vertices, ratio, max_error = read_target(n_vertices, ratio, max_error)
     with run.stage("prepare"):
-        source = prepared_input(surface, options)
+        source = prepared_input(given, options)
     prepared = source.prepared.surface
     if max_error is not None:
         options = replace(options, denoise=False)  # the distance asked for refers to the input itself
@@ -105,9 +108,22 @@ def remesh(
             run.on_step(StepInfo(stage="search", message=f"{n:,} vertices"))
             return _remesh(source, n, options, run, nearest=True)
 
-        return smallest_within(with_vertices, prepared, max_error, deadline)
-    n = n_vertices or max(MIN_VERTICES, round((ratio or 0.0) * prepared.n_points))
-    return _remesh(source, n, options, run)
+        result = smallest_within(with_vertices, prepared, max_error, deadline)
+    else:
+        n = n_vertices or max(MIN_VERTICES, round((ratio or 0.0) * prepared.n_points))
+        result = _remesh(source, n, options, run)
+    return _with_attributes(result, given, run) if options.attributes else result
+
+
+def _with_attributes(result: RemeshResult, given: Mesh, run: Run) -> RemeshResult:
+    """Return a result with everything that a mesh carries."""
+    if given.is_bare:
+        return result
+    with run.stage("attributes"):
+        source = oriented_as(given, result.prepared) if result.prepare_report.faces_flipped else given
+        mesh = transfer_attributes(source, result.surface)
+    warnings = (*result.warnings, *losses_of_attributes(given, mesh))
+    return replace(result, mesh=mesh, seconds=run.total_seconds(), warnings=warnings)
 
 
 def _remesh(source: PreparedInput, n: int, options: RemeshOptions, run: Run, *, nearest: bool = False) -> RemeshResult:
@@ -117,8 +133,10 @@ def _remesh(source: PreparedInput, n: int, options: RemeshOptions, run: Run, *, 
     run.check_time()
     made = _valid_mesh(task, tasks.fit, tasks.options, run)
     mesh, optimised, validity = made.mesh, made.optimised, made.validity
+    surface = Surface(frame.to_model(mesh.points), mesh.faces)
     return RemeshResult(
-        surface=Surface(frame.to_model(mesh.points), mesh.faces),
+        surface=surface,
+        mesh=Mesh(surface=surface),
         prepared=prepared.surface,
         prepare_report=prepared.report,
         working=task.voronoi.embedded.surface,
@@ -140,6 +158,7 @@ def _remesh(source: PreparedInput, n: int, options: RemeshOptions, run: Run, *, 
         seconds=run.total_seconds(),
         warnings=(
             *losses_of_repair(prepared.report),
+            *tasks.remarks,
             *field.remarks,
             *losses_of_shape(
                 tasks.surface, Surface(mesh.points, mesh.faces), task.corner_places, made.feature_distance

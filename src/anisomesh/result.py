@@ -8,6 +8,7 @@ from math import isfinite
 from typing import Any
 
 from anisomesh._arrays import CornerTensors, PointTensors, Sites
+from anisomesh.attributes.model import Mesh
 from anisomesh.cvt.lbfgs import Status
 from anisomesh.embedding.base import Embedding
 from anisomesh.io.rvd import PolygonMesh, save_polygons
@@ -28,6 +29,8 @@ class RemeshResult:
     ----------
     surface
         The result, in model units.
+    mesh
+        The same with everything that the input carries, see :func:`~anisomesh.attributes.transfer.transfer_attributes`.
     prepared
         The input after repair, in model units.
     prepare_report
@@ -71,6 +74,7 @@ class RemeshResult:
     """
 
     surface: Surface
+    mesh: Mesh
     prepared: Surface
     prepare_report: PrepareReport
     working: Surface

@@ -14,6 +14,7 @@ from anisomesh.execution.memory import check_memory
 from anisomesh.execution.run import Run
 from anisomesh.features.detect import WEAK_ANGLE, apexes, sharp_edges
 from anisomesh.features.network import FeatureNetwork, trace_features
+from anisomesh.features.smooth_lines import with_smooth_lines
 from anisomesh.fitting.fit import FitPlan
 from anisomesh.fitting.target import FitTarget
 from anisomesh.inputs import PreparedInput
@@ -27,7 +28,7 @@ from anisomesh.metric.narrow_patches import limit_to_patches
 from anisomesh.metric.thin_walls import separate_thin_walls
 from anisomesh.metric.transfer import PlacedMetric
 from anisomesh.options import RemeshOptions
-from anisomesh.resolve import embedder, fit_plan, follows_creases, metric_source, with_embedding_chosen
+from anisomesh.resolve import embedder, fit_plan, follows_creases, is_designed, metric_source, with_embedding_chosen
 from anisomesh.voronoi.restricted import RestrictedVoronoi
 
 
@@ -51,6 +52,8 @@ class Tasks:
         The task to make a mesh from sites.
     fit
         What that mesh is fitted to, None if it is not.
+    remarks
+        What a user should know, one sentence each.
     """
 
     options: RemeshOptions
@@ -60,6 +63,7 @@ class Tasks:
     embedding: Embedding
     dual: MeshingTask
     fit: FitTarget | None
+    remarks: tuple[str, ...]
 
 
 def set_up(source: PreparedInput, n: int, options: RemeshOptions, run: Run, *, nearest: bool) -> Tasks:
@@ -72,9 +76,14 @@ def set_up(source: PreparedInput, n: int, options: RemeshOptions, run: Run, *, n
         frame = unit_frame(prepared.surface.points)
         surface = prepared.surface.with_points(frame.to_unit(prepared.surface.points))
         options = with_embedding_chosen(options, surface)
+        tagged, remarks = source.features_at(n)
+        surface = _with_smooth_borders(surface, source, tagged, options.feature_angle)
         creases = sharp_edges(surface, min(options.feature_angle, WEAK_ANGLE))
-        split = working_surface(surface, n, creases=creases, tagged=source.tagged)
-        tips = apexes(split.coarse, sharp_edges(split.coarse, options.feature_angle))
+        creases |= source.fixed[surface.edges].any(axis=1)  # so that the points stay
+        split = working_surface(surface, n, creases=creases, tagged=tagged)
+        tips = split.on_coarse(source.fixed)
+        if follows_creases(options):
+            tips |= apexes(split.coarse, sharp_edges(split.coarse, options.feature_angle))
         check_memory(n, split.surface.n_faces)
     with run.stage("metric"):
         tensors = None if source.tensors is None else split.interpolate(source.tensors * frame.scale**2)
@@ -107,7 +116,21 @@ def set_up(source: PreparedInput, n: int, options: RemeshOptions, run: Run, *, n
         embedding=embedding,
         dual=task,
         fit=target,
+        remarks=remarks,
     )
+
+
+def _with_smooth_borders(surface: Surface, source: PreparedInput, followed: EdgeMask, crease_angle: float) -> Surface:
+    """Return a surface with smoother borders and seams among the edges (E,) that are followed, unless it is designed.
+
+    On a scan these go around triangles, which are smaller than the ones of the result.
+    """
+    lines = followed & ~source.tagged
+    if not lines.any() or is_designed(surface):
+        return surface
+    fixed = surface.on_boundary | source.fixed
+    fixed[surface.edges[source.tagged | sharp_edges(surface, crease_angle)]] = True
+    return with_smooth_lines(surface, lines, fixed)
 
 
 def _fit_target(
@@ -128,11 +151,10 @@ def _fit_target(
 def _features(
     embedded: EmbeddedSurface, n: int, tagged: EdgeMask, tips: PointMask, options: RemeshOptions
 ) -> FeatureNetwork:
-    """Return boundary, creases and apexes; with the plain CVT only the tagged edges.
+    """Return boundary, creases and apexes; with the plain CVT only the tagged edges and the tips.
 
-    ``tagged`` are edges (E,) of the embedded surface, and ``tips`` the apexes among its first points.
+    ``tagged`` are edges (E,) of the embedded surface, and ``tips`` apexes and fixed points among its first points.
     """
     angle = options.feature_angle if follows_creases(options) else 180.0
     sharp = sharp_edges(embedded.surface, angle) | tagged
-    apex = np.flatnonzero(tips & follows_creases(options))
-    return trace_features(embedded, n, sharp=sharp, required=tagged, apexes=apex)
+    return trace_features(embedded, n, sharp=sharp, required=tagged, apexes=np.flatnonzero(tips))

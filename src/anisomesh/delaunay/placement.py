@@ -151,8 +151,8 @@ def snap_to_missed_corners(
     -----
     Where a cell contains little more than the tip of a corner, the planes there weigh next to nothing, and the corner
     is cut off by a tenth of an edge or more. The vertex of a cell moves to the corner in it that the mesh is farthest
-    from, and back if that increases the distance to the mesh in the cells around. The apex of a cone is such a corner
-    in any case, even where little is cut off, and the vertex stays there.
+    from, and back if that increases the distance to the mesh in the cells around. The apex of a cone or a fixed point
+    is such a corner in any case, even where little is cut off, and the vertex stays there.
     """
     surface = cells.embedded.surface
     owner = _owners(cells)
@@ -161,7 +161,8 @@ def snap_to_missed_corners(
     squared = ClosestPoints(mesh).squared_distances(surface.points)
     apex = np.zeros(surface.n_points, dtype=bool)
     apex[features.apexes] = True
-    far = (corners(surface, features.sharp) & (squared > missed)) | (apex & (squared > 0.0))
+    apex &= (points[owner] != surface.points).any(axis=1)
+    far = (corners(surface, features.sharp) & (squared > missed)) | apex
     candidate = np.flatnonzero(far & (owner >= 0) & movable[owner])
     candidate = candidate[np.argsort(squared[candidate], kind="stable")[::-1]]
     vertex, farthest = first_of_each(owner, candidate)

@@ -11,7 +11,7 @@ from dataclasses import dataclass
 import numpy as np
 import numpy.typing as npt
 
-from anisomesh._arrays import EdgeMask, PointLabels
+from anisomesh._arrays import EdgeMask, PointLabels, PointMask
 from anisomesh.mesh.delaunay_refinement import Refinement, refine_slivers
 from anisomesh.mesh.geometry import even_edge_length
 from anisomesh.mesh.marked_surface import MarkedSurface
@@ -60,6 +60,10 @@ class WorkingSurface:
     def interpolate(self, values: npt.NDArray[np.float64]) -> npt.NDArray[np.float64]:
         """Interpolate values (V, ...) at the points of the input linearly to all points (V', ...)."""
         return self._subdivision.interpolate(self._refinement.interpolate(values[self._kept])[self._trimmed])
+
+    def on_coarse(self, mask: PointMask) -> PointMask:
+        """Return a mask of points of the input (V,) as a mask of the points of ``coarse``."""
+        return np.asarray(mask[self._kept])
 
 
 def working_surface(surface: Surface, n_vertices: int, *, creases: EdgeMask, tagged: EdgeMask) -> WorkingSurface:

@@ -1,0 +1,1 @@
+"""What a mesh carries besides its geometry, and its transfer to another mesh of the same surface."""

@@ -1,0 +1,118 @@
+"""Values between the corners of a triangle: means, rounded means, unit vectors, or values of the nearest corner."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Mapping
+
+import numpy as np
+import numpy.typing as npt
+
+from anisomesh.attributes.model import Array
+from anisomesh.mesh.geometry import unit
+
+_COLOUR = re.compile(r"colou?r|rgb", re.IGNORECASE)
+_DIRECTION = re.compile(r"normal|tangent", re.IGNORECASE)
+_SHARES = re.compile(r"weight", re.IGNORECASE)
+_JOINTS = re.compile(r"joints", re.IGNORECASE)
+_TOLERANCE = 1e-2  # deviation of lengths of unit vectors and of sums of shares from 1, in files of half precision
+
+Floats = npt.NDArray[np.float64]
+
+
+class Blend:
+    """How an array is evaluated between the points or corners at which it is given.
+
+    Parameters
+    ----------
+    name
+        Name of the array.
+    values
+        Its rows (n, ...).
+
+    Notes
+    -----
+    Real and complex numbers are interpolated linearly; bools, integers and strings are taken from the nearest corner.
+    The name tells two kinds from these: integers named colour or rgb are interpolated and rounded. What is named normal
+    or tangent and has unit length stays so (of four components the first three: the fourth is a sign), and rows of
+    shares named weight keep their sum 1.
+    """
+
+    def __init__(self, name: str, values: Array) -> None:
+        self._dtype, kind, width = values.dtype, values.dtype.kind, values.shape[-1] if values.ndim > 1 else 1
+        self._rounds = kind in "iu" and bool(_COLOUR.search(name))
+        self._nearest = kind not in "fc" and not self._rounds
+        rows = values.reshape(-1, width) if kind == "f" else np.zeros((0, 1))
+        self._directs = bool(_DIRECTION.search(name)) and _is_unit(rows)
+        shares = bool(_SHARES.search(name)) and width > 1 and len(rows) > 0 and bool((rows >= 0.0).all())
+        self._shares = shares and bool((np.abs(rows.sum(axis=1) - 1.0) < _TOLERANCE).all())
+
+    def at(self, corners: Array, weights: Floats, nearest: npt.NDArray[np.int64]) -> Array:
+        """Return the values (n, ...) between the values at corners (n, 3, ...), with barycentric weights (n, 3).
+
+        ``nearest`` is the nearest corner (n,).
+        """
+        from_nearest = corners[np.arange(len(corners)), nearest]
+        if self._nearest:
+            return np.asarray(from_nearest)
+        mean = np.einsum("nc,nc...->n...", weights, corners)
+        undefined = ~np.isfinite(mean)
+        mean[undefined] = from_nearest[undefined]
+        if self._rounds:
+            mean = np.rint(mean)
+        if self._shares:
+            mean /= mean.sum(axis=-1, keepdims=True)
+        if self._directs:
+            size = np.linalg.norm(mean[..., :3], axis=-1, keepdims=True)
+            mean = np.where(size > 0.0, mean, from_nearest)
+            mean[..., :3] = unit(mean[..., :3])
+            mean[..., 3:] = from_nearest[..., 3:]
+        return np.asarray(mean.astype(self._dtype))
+
+
+def _is_unit(rows: Array) -> bool:
+    """Return whether rows (n, k) are vectors of length 1, with a sign or without."""
+    if len(rows) == 0 or rows.shape[1] not in (3, 4):
+        return False
+    return bool((np.abs(np.linalg.norm(rows[:, :3], axis=1) - 1.0) < _TOLERANCE).all())
+
+
+def skin_sets(data: Mapping[str, Array]) -> list[tuple[str, str]]:
+    """Return the pairs of names of joints and their weights, as JOINTS_0 and WEIGHTS_0 of glTF."""
+    found = []
+    for name in sorted(data):
+        other = _JOINTS.sub(lambda word: "WEIGHTS" if word[0].isupper() else "weights", name)
+        if other == name or other not in data:
+            continue
+        joints, shares = data[name], data[other]
+        numbers = joints.dtype.kind in "iu" and shares.dtype.kind == "f"
+        if numbers and joints.ndim == 2 and joints.shape == shares.shape:
+            found.append((name, other))
+    return found
+
+
+def blend_skin(joints: Array, shares: Array, weights: Floats) -> tuple[Array, Array]:
+    """Return the joints (n, k) with the largest weights between three corners, and these, which sum to 1.
+
+    Parameters
+    ----------
+    joints, shares
+        Joints of the three corners and their weights (n, 3, k).
+    weights
+        Barycentric coordinates (n, 3).
+    """
+    k = joints.shape[2]
+    numbers = joints.reshape(len(joints), 3 * k)
+    parts = (shares * weights[:, :, None]).reshape(len(joints), 3 * k).astype(np.float64)
+    order = np.argsort(numbers, axis=1, kind="stable")
+    numbers, parts = np.take_along_axis(numbers, order, axis=1), np.take_along_axis(parts, order, axis=1)
+    for column in range(1, 3 * k):
+        same = numbers[:, column] == numbers[:, column - 1]
+        parts[:, column] += np.where(same, parts[:, column - 1], 0.0)
+        parts[:, column - 1] = np.where(same, 0.0, parts[:, column - 1])
+    largest = np.argsort(-parts, axis=1, kind="stable")[:, :k]
+    numbers, parts = np.take_along_axis(numbers, largest, axis=1), np.take_along_axis(parts, largest, axis=1)
+    total = parts.sum(axis=1, keepdims=True)
+    parts = np.divide(parts, total, out=np.zeros_like(parts), where=total > 0.0)
+    numbers = np.where(parts > 0.0, numbers, 0)
+    return numbers.astype(joints.dtype), parts.astype(shares.dtype)

@@ -1,0 +1,178 @@
+"""A surface with everything that is given at its points, faces and corners."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field, fields
+from functools import cached_property
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+
+from anisomesh._arrays import EdgeEnds
+from anisomesh.errors import MeshError
+from anisomesh.mesh.surface import Surface
+
+_KINDS = "biufcSU"  # of dtypes: bools, integers, real and complex numbers, strings
+
+Array = npt.NDArray[Any]
+Ints = npt.NDArray[np.int64]
+
+
+@dataclass(frozen=True, eq=False)
+class Regions:
+    """A division of the faces of a surface into regions.
+
+    Attributes
+    ----------
+    labels
+        Label of the region of each face (F,), any integers.
+    names
+        Names of labels, for the ones that have one.
+    """
+
+    labels: Ints
+    names: Mapping[int, str] = field(default_factory=dict)
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "labels", _whole_numbers("region labels", self.labels))
+        object.__setattr__(self, "names", {int(label): str(name) for label, name in dict(self.names).items()})
+
+
+@dataclass(frozen=True, eq=False, kw_only=True)
+class Mesh:
+    """A surface with everything that a file can say of it.
+
+    Attributes
+    ----------
+    surface
+        Points and faces.
+    point_data, face_data
+        Arrays by name, with one row for each point (V, ...) or face (F, ...): bools, numbers or strings.
+    corner_data
+        Arrays by name with a row for each corner of each face (F, 3, ...), such as texture coordinates and normals,
+        which may differ between the faces at a point. No name is in ``point_data`` too.
+    regions
+        Divisions of the faces by name: the physical groups of Gmsh, the groups and materials of an OBJ file, the solids
+        of STL.
+    features
+        Edges that stay edges, as pairs of points (n, 2).
+    fixed_points
+        Points at which there stays a point (n,).
+    materials
+        Anything that belongs to the mesh as a whole or to regions, by name. It is handed on as it is.
+
+    Raises
+    ------
+    MeshError
+        If an array has the wrong length or a type that cannot be carried, or points of features are out of range.
+
+    Notes
+    -----
+    Arrays are copied and read-only.
+    """
+
+    surface: Surface
+    point_data: Mapping[str, Array] = field(default_factory=dict)
+    face_data: Mapping[str, Array] = field(default_factory=dict)
+    corner_data: Mapping[str, Array] = field(default_factory=dict)
+    regions: Mapping[str, Regions] = field(default_factory=dict)
+    features: EdgeEnds = field(default_factory=lambda: np.zeros((0, 2), dtype=np.int64))
+    fixed_points: Ints = field(default_factory=lambda: np.zeros(0, dtype=np.int64))
+    materials: Mapping[str, Any] = field(default_factory=dict)
+
+    def __post_init__(self) -> None:
+        if not isinstance(self.surface, Surface):
+            raise MeshError(f"surface is of type {type(self.surface).__name__}; expected a Surface")
+        n_points, n_faces = self.surface.n_points, self.surface.n_faces
+        shapes = {"point_data": (n_points,), "face_data": (n_faces,), "corner_data": (n_faces, 3)}
+        for data, shape in shapes.items():
+            given = dict(getattr(self, data))
+            object.__setattr__(self, data, {name: _checked(f"{data}[{name!r}]", given[name], shape) for name in given})
+        both = sorted(set(self.point_data) & set(self.corner_data))
+        if both:
+            raise MeshError(f"{both[0]!r} is in point_data and in corner_data; give them different names")
+        for name, regions in self.regions.items():
+            if not isinstance(regions, Regions):
+                raise MeshError(
+                    f"regions[{name!r}] is of type {type(regions).__name__}; expected Regions(labels, names)"
+                )
+            _checked(f"regions[{name!r}].labels", regions.labels, (n_faces,))
+        object.__setattr__(self, "regions", dict(self.regions))
+        object.__setattr__(self, "materials", dict(self.materials))
+        object.__setattr__(self, "features", _points_of("features", self.features, n_points, 2))
+        object.__setattr__(self, "fixed_points", _points_of("fixed_points", self.fixed_points, n_points, 1))
+
+    def __repr__(self) -> str:
+        names = {f.name: len(getattr(self, f.name)) for f in fields(self) if f.name != "surface"}
+        carried = ", ".join(f"{count:,} {name}" for name, count in names.items() if count)
+        return f"Mesh({self.surface!r}{', ' * bool(carried)}{carried})"
+
+    @property
+    def is_bare(self) -> bool:
+        """Whether the mesh carries nothing besides its surface."""
+        return not any(len(getattr(self, f.name)) for f in fields(self) if f.name != "surface")
+
+    @cached_property
+    def parts(self) -> Ints:
+        """Number of the part of each face (F,): faces are in one part if they are in the same region of each division.
+
+        Parts are numbered from 0 in the order of their labels.
+        """
+        if not self.regions:
+            return np.zeros(self.surface.n_faces, dtype=np.int64)
+        labels = np.stack([self.regions[name].labels for name in sorted(self.regions)], axis=1)
+        return np.unique(labels, axis=0, return_inverse=True)[1].reshape(-1).astype(np.int64)
+
+    @cached_property
+    def part_labels(self) -> dict[str, Ints]:
+        """Label of each part, (P,), in each division."""
+        first = np.unique(self.parts, return_index=True)[1]
+        return {name: regions.labels[first] for name, regions in self.regions.items()}
+
+
+def _checked(name: str, values: Any, shape: tuple[int, ...]) -> Array:
+    """Return values as a read-only array, or an error unless they can be carried and begin with a shape."""
+    try:
+        array = np.array(values)
+    except ValueError as error:
+        raise MeshError(f"{name} has rows of different lengths ({error})") from error
+    if array.dtype.kind not in _KINDS:
+        raise MeshError(f"{name} has dtype {array.dtype}; expected bools, numbers or strings")
+    if array.shape[: len(shape)] != shape:
+        expected = ", ".join(map(str, shape))
+        of_what = {1: "a row for each point or face", 2: "a row for each corner of each face"}[len(shape)]
+        raise MeshError(f"{name} has shape {array.shape}; expected ({expected}, ...), {of_what} of the surface")
+    array.flags.writeable = False
+    return array
+
+
+def _whole_numbers(name: str, values: Any) -> Ints:
+    """Return values as read-only integers, or an error unless they are."""
+    array = np.asarray(values)
+    if array.size == 0:
+        array = array.astype(np.int64)
+    if array.dtype.kind not in "iu":
+        raise MeshError(f"{name} have dtype {array.dtype}; expected integers")
+    array = array.astype(np.int64)
+    array.flags.writeable = False
+    return array
+
+
+def _points_of(name: str, values: Any, n_points: int, width: int) -> Ints:
+    """Return points as (n,) or (n, 2) read-only integers, or an error unless they are points of the surface."""
+    array = _whole_numbers(name, values)
+    if array.size == 0:
+        array = np.zeros((0, 2) if width == 2 else (0,), dtype=np.int64)
+    if array.shape[1:] != ((2,) if width == 2 else ()) or array.ndim == 0:
+        expected = "(n, 2), two points for each edge" if width == 2 else "(n,), a point each"
+        raise MeshError(f"{name} has shape {array.shape}; expected {expected}")
+    wrong = np.flatnonzero((array < 0) | (array >= n_points))
+    if len(wrong):
+        raise MeshError(
+            f"{name} has the point {array.ravel()[wrong[0]]}; expected 0 to {n_points - 1} since there are {n_points} "
+            "points"
+        )
+    array.flags.writeable = False
+    return array
