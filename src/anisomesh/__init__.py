@@ -27,7 +27,7 @@ if TYPE_CHECKING:
     from anisomesh.features.network import trace_features
     from anisomesh.fitting.target import FitTarget
     from anisomesh.fitting.valid import fit_without_faults
-    from anisomesh.io.meshes import load, save
+    from anisomesh.io.meshes import load, load_mesh, save
     from anisomesh.learn.inference.source import Hybrid, Neural
     from anisomesh.mesh.embedded_surface import EmbeddedSurface
     from anisomesh.mesh.surface import Surface
@@ -53,6 +53,7 @@ _MODULE_OF = {
     # meshes in and out, judged and drawn
     "Surface": "mesh.surface",
     "load": "io.meshes",
+    "load_mesh": "io.meshes",
     "save": "io.meshes",
     "save_rvd": "result",
     "sample": "shapes.analytic",
@@ -132,6 +133,7 @@ __all__ = [
     "evaluate",
     "fit_without_faults",
     "load",
+    "load_mesh",
     "mesh_from_sites",
     "optimise_sites",
     "precomputed_embedding",

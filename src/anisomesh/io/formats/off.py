@@ -6,8 +6,9 @@ import re
 
 import numpy as np
 
-from anisomesh._arrays import Faces, Points
+from anisomesh.attributes.model import Mesh
 from anisomesh.io.formats.words import coordinates, format_rows, integers
+from anisomesh.io.holding import Losses
 from anisomesh.io.polygons import PolygonSoup
 
 
@@ -47,7 +48,17 @@ def read_off(data: bytes) -> PolygonSoup:
     return PolygonSoup(points=points, corners=integers(rows_of_corners, numbers[face_lines]), sizes=sizes)
 
 
-def off_text(points: Points, faces: Faces) -> str:
-    """Return the content of an OFF file."""
+def off_bytes(mesh: Mesh, losses: Losses) -> bytes:
+    """Return the content of an OFF file: points and triangles."""
+    points, faces = mesh.surface.points, mesh.surface.faces
+    for what, names in (
+        ("point data", mesh.point_data),
+        ("face data", mesh.face_data),
+        ("corner data", mesh.corner_data),
+        ("regions", mesh.regions),
+        ("materials", mesh.materials),
+    ):
+        losses.add(what, *names)
+    losses.features(mesh)
     head = f"OFF\n{len(points)} {len(faces)} 0\n"
-    return head + format_rows("%r %r %r\n", points) + format_rows("3 %d %d %d\n", faces)
+    return (head + format_rows("%r %r %r\n", points) + format_rows("3 %d %d %d\n", faces)).encode()

@@ -1,0 +1,118 @@
+"""The material files (.mtl) beside OBJ files."""
+
+from __future__ import annotations
+
+import os
+import re
+from dataclasses import replace
+from pathlib import Path
+
+from anisomesh.attributes.model import Mesh
+from anisomesh.io.atomic import atomic_path
+from anisomesh.io.formats.obj.attributes import LIBRARIES
+from anisomesh.io.holding import Losses
+
+_MARK = "# materials of a mesh that anisomesh has written\n"
+_TEXTURE = re.compile(r"\s*(?:map_\w+|bump|disp|decal|refl|norm)\s", re.IGNORECASE)
+
+
+def read_beside(mesh: Mesh, path: Path) -> tuple[Mesh, tuple[str, ...]]:
+    """Return a mesh with the text and the folder of its material files, and what is missing, a line each."""
+    given = mesh.materials.get("obj")
+    if given is None:
+        return mesh, ()
+    folder = path.resolve().parent
+    texts, losses = [], []
+    for name in _names(given[LIBRARIES], folder):
+        file = folder / name
+        try:
+            if file.suffix.lower() != ".mtl":
+                raise OSError("expected a .mtl file")
+            texts.append(file.read_text(encoding="utf-8", errors="surrogateescape"))
+        except (OSError, ValueError) as error:
+            losses.append(f"left out the materials of {name!r}: {getattr(error, 'strerror', None) or error}")
+    found = {**given, "text": "\n".join(texts), "folder": str(folder)} if texts else given
+    return replace(mesh, materials={**mesh.materials, "obj": found}), tuple(losses)
+
+
+def _names(libraries: tuple[str, ...], folder: Path) -> list[str]:
+    """Return the names of files in lines, in each of which there may be several, or one with spaces."""
+    names = []
+    for line in libraries:
+        names += [line] if (folder / line).exists() or not line.lower().count(".mtl ") else line.split()
+    return names
+
+
+def write_beside(content: bytes, mesh: Mesh, path: Path | None, losses: Losses) -> bytes:
+    """Return the content of an OBJ file with the name of its material file, which is written beside it.
+
+    Parameters
+    ----------
+    content
+        The content without materials.
+    mesh
+        The mesh.
+    path
+        The OBJ file; None for a stream, beside which nothing can be written.
+    losses
+        What is left out is added here.
+
+    Notes
+    -----
+    In the folder of the input its material files are named again. Elsewhere their content is written to a file with the
+    stem of the OBJ file, and textures are named by paths relative to it; they are not copied.
+    """
+    given = mesh.materials.get("obj")
+    if given is None:
+        return content
+    libraries = given[LIBRARIES]
+    if "text" not in given or path is None:
+        if "text" in given:
+            losses.say("the content of material files, since a stream has no folder; it only names them")
+    elif str(path.resolve().parent) != given["folder"]:
+        folder = path.resolve().parent
+        target = _free_name(folder, path.stem)
+        text = _MARK + _moved(given["text"], Path(given["folder"]), folder)
+        with atomic_path(target) as temporary:
+            temporary.write_text(text, encoding="utf-8", errors="surrogateescape", newline="")
+        libraries = (target.name,)
+    lines = "".join(f"{LIBRARIES} {name}\n" for name in libraries)
+    return lines.encode("utf-8", errors="replace") + content
+
+
+def _free_name(folder: Path, stem: str) -> Path:
+    """Return a name that no file of the user has; a file of ours is replaced."""
+    number = 0
+    while True:
+        target = folder / (f"{stem}_{number}.mtl" if number else f"{stem}.mtl")
+        if not target.exists() or (target.is_file() and target.read_bytes().startswith(_MARK.encode())):
+            return target
+        number += 1
+
+
+def _moved(text: str, old: Path, new: Path) -> str:
+    """Return materials with the textures that are found from the old folder named from the new one."""
+    lines = []
+    for line in text.splitlines():
+        place = _texture_name(line, old) if _TEXTURE.match(line) else None
+        if place is not None:
+            try:
+                name = os.path.relpath(old / line[place:].strip(), new)
+            except ValueError:  # on another drive
+                name = str(old / line[place:].strip())
+            line = line[:place] + name.replace(os.sep, "/")
+        lines.append(line)
+    return "\n".join([*lines, ""])
+
+
+def _texture_name(line: str, folder: Path) -> int | None:
+    """Return where the name of an existing file begins that ends a line, after options and their values."""
+    starts = [match.end() for match in re.finditer(r"\s+", line.rstrip())]
+    for start in starts:
+        name = line[start:].strip()
+        try:
+            if name and not Path(name).is_absolute() and (folder / name).is_file():
+                return start
+        except (OSError, ValueError):
+            continue
+    return None
