@@ -20,7 +20,7 @@ from anisomesh.shapes.analytic import box
 
 PAGE = Path(__file__).parents[1] / "docs/reference/formats.md"
 BEGIN, END = "<!-- begin: python benchmarks/formats.py -->", "<!-- end -->"
-EXACT, ROUNDED, NAMES, LOST = "yes", "float32", "names", "–"
+EXACT, ROUNDED, NAMES, LOST = "yes", "float32", "names", "-"
 
 SURFACE = box(n=3)
 RNG = np.random.default_rng(0)
@@ -100,7 +100,7 @@ def values_at_corners(mesh: Mesh, name: str) -> np.ndarray | None:
     return None
 
 
-def same(values: np.ndarray, read: np.ndarray | None) -> str:
+def values_kept(values: np.ndarray, read: np.ndarray | None) -> str:
     """Return how well values were kept."""
     if read is not None and values.ndim == 2 and read.shape == (len(values), 4) and values.shape[1] == 3:
         read = read[:, :3] if (read[:, 3] == 255).all() else None  # opaque colours
@@ -116,7 +116,7 @@ def same(values: np.ndarray, read: np.ndarray | None) -> str:
     return ROUNDED if close else LOST
 
 
-def same_regions(mesh: Mesh, read: Mesh) -> str:
+def regions_kept(mesh: Mesh, read: Mesh) -> str:
     """Return how well all divisions were kept, whatever they are called."""
     _, faces, _ = by_corner(mesh)
     _, faces_read, _ = by_corner(read)
@@ -148,9 +148,9 @@ def kept(mesh: Mesh, read: Mesh) -> str:
     """Return how well a file has kept everything that a mesh carries."""
     results = []
     for data in (mesh.point_data, mesh.face_data, mesh.corner_data):
-        results += [same(values_at_corners(mesh, name), values_at_corners(read, name)) for name in data]
+        results += [values_kept(values_at_corners(mesh, name), values_at_corners(read, name)) for name in data]
     if mesh.regions:
-        results.append(same_regions(mesh, read))
+        results.append(regions_kept(mesh, read))
     for name in ("features", "fixed_points"):
         given, found = getattr(mesh, name), getattr(read, name)
         if len(given):

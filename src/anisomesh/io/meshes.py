@@ -128,8 +128,8 @@ def load_mesh(path: str | os.PathLike[str] | BinaryIO, *, file_format: str | Non
     Notes
     -----
     Texture coordinates are called ``uv``, unit normals ``normal`` and colours ``color``, whatever the format calls
-    them. Attributes that are broken, or that a :class:`Mesh` cannot hold, are left out, with a line each in the log. The
-    materials of an OBJ file are read from the .mtl files beside it.
+    them. Attributes that are broken, or that a :class:`Mesh` cannot hold, are left out, with a line each in the log.
+    The materials of an OBJ file are read from the .mtl files beside it.
     """
     name, mesh, losses = _read(path, file_format)
     if isinstance(path, str | os.PathLike):
@@ -237,7 +237,8 @@ def save(
         with atomic_path(name) as temporary:
             temporary.write_bytes(content)
     if losses.text():
-        logger.warning("%s: left out what %s cannot hold: %s", name, suffix[1:].upper(), losses.text())
+        format_name = "MEDIT" if suffix == ".mesh" else suffix[1:].upper()
+        logger.warning("%s: left out what %s cannot hold: %s", name, format_name, losses.text())
 
 
 def _with_point_data(mesh: Mesh, path: str, point_data: PointData) -> Mesh:

@@ -48,6 +48,7 @@ class Elements:
         self._table = table
         self._tags: list[tuple[Integers, Integers]] = []  # cells, rows of number, physical group, entity
         self._count = 0
+        self._surface: list[Integers] = [np.zeros(0, dtype=np.int64)]
         self._lines: list[Integers] = []
         self._points: list[Integers] = []
 
@@ -72,6 +73,7 @@ class Elements:
         """
         self._tags.append((source, tags))
         if kind in _GMSH_SHAPES:
+            self._surface.append(source)
             shape = _GMSH_SHAPES[kind]
             nodes_on_sides = _N_NODES[kind] <= 2 * N_CORNERS[shape] + 1
             self.cells.add(shape, self._table.indices(nodes), source, nodes_on_sides=nodes_on_sides)
@@ -89,12 +91,20 @@ class Elements:
         table = np.zeros((self._count, 3), dtype=np.int64)
         for source, tags in self._tags:
             table[source] = tags
-        if table[:, 1].any():
+        physical, entity = table[np.concatenate(self._surface)][:, 1:].T
+        if physical.any():
             carried.add_cell_data("physical", table[:, 1], names={})
-        if len(np.unique(table[:, 2])) > 1:
+        if len(np.unique(entity)) > 1 and (entity != entities_of(physical)).any():
             carried.add_cell_data("geometrical", table[:, 2], names={})
         numbers: Integers = table[:, 0]
         return numbers
+
+
+def entities_of(physical: Integers) -> Integers:
+    """Return the entities of elements (n,) if there is one for each physical group: its number, or one from 1."""
+    if len(physical) and physical.min() > 0:
+        return physical
+    return np.unique(physical, return_inverse=True)[1].reshape(-1).astype(np.int64) + 1
 
 
 def elements_2_text(numbers: NumberStream, elements: Elements) -> None:

@@ -6,7 +6,7 @@ import numpy as np
 
 from anisomesh.attributes.model import Mesh, Regions
 from anisomesh.io.carried import Array, Integers, separate_columns
-from anisomesh.io.formats.gmsh.elements import LINE, POINT, TRIANGLE
+from anisomesh.io.formats.gmsh.elements import LINE, POINT, TRIANGLE, entities_of
 from anisomesh.io.holding import Losses, continuous_corner_data, flat_rows, main_division, name_of, numeric
 
 _WIDTHS = (1, 3, 9)  # numbers of components that Gmsh knows
@@ -30,7 +30,7 @@ def msh_bytes(mesh: Mesh, losses: Losses) -> bytes:
         _elements(LINE, mesh.features, 0, 1, 1 + len(faces)),
         _elements(POINT, mesh.fixed_points[:, None], 1, 1, 1 + len(faces) + len(mesh.features)),
     ]
-    count = len(faces) + len(mesh.features) + len(mesh.fixed_points)
+    n_others = len(mesh.features) + len(mesh.fixed_points)
     point_data = {**mesh.point_data, **continuous_corner_data(mesh, losses)}
     losses.add("materials", *mesh.materials)
     return b"".join(
@@ -38,9 +38,9 @@ def msh_bytes(mesh: Mesh, losses: Losses) -> bytes:
             b"$MeshFormat\n2.2 1 8\n" + (1).to_bytes(4, "little") + b"\n$EndMeshFormat\n",
             _physical_names(physical),
             b"$Nodes\n%d\n" % len(points) + nodes.tobytes() + b"\n$EndNodes\n",
-            b"$Elements\n%d\n" % count + b"".join(parts) + b"\n$EndElements\n",
-            *_data("NodeData", numeric(point_data, "point data", losses)),
-            *_data("ElementData", {**numeric(mesh.face_data, "face data", losses), **others}),
+            b"$Elements\n%d\n" % (len(faces) + n_others) + b"".join(parts) + b"\n$EndElements\n",
+            *_data("NodeData", numeric(point_data, "point data", losses), 0),
+            *_data("ElementData", {**numeric(mesh.face_data, "face data", losses), **others}, n_others),
         ]
     )
 
@@ -61,7 +61,7 @@ def _divisions(mesh: Mesh, losses: Losses) -> tuple[Regions | None, Integers, di
         geometrical = entities.labels
         losses.names_of_regions(mesh, "geometrical")
     elif physical is not None:
-        geometrical = np.unique(physical.labels, return_inverse=True)[1].reshape(-1) + 1
+        geometrical = entities_of(physical.labels)
     else:
         geometrical = np.ones(mesh.surface.n_faces, dtype=np.int64)
     losses.names_of_regions(mesh, *usable)
@@ -89,15 +89,16 @@ def _quoted(text: str) -> str:
     return text.replace('"', "'")
 
 
-def _data(section: str, data: dict[str, Array]) -> list[bytes]:
-    """Return the sections of arrays; rows of a width that Gmsh does not know are written by column."""
+def _data(section: str, data: dict[str, Array], n_others: int) -> list[bytes]:
+    """Return the sections of arrays, with NaN for other elements; of a width that Gmsh does not know by column."""
     known = {name: rows for name, values in data.items() if _width(rows := flat_rows(values)) in _WIDTHS}
     columns = separate_columns({name: values for name, values in data.items() if name not in known})
     found = []
     for name, values in {**known, **columns}.items():
-        width, count = _width(values), len(values)
+        width, count = _width(values), len(values) + n_others
         rows = np.zeros(count, dtype=[("tag", "<i4"), ("values", "<f8", (width,))])
-        rows["tag"], rows["values"] = np.arange(1, count + 1), values.reshape(count, width)
+        rows["tag"], rows["values"] = np.arange(1, count + 1), np.nan
+        rows["values"][: len(values)] = values.reshape(-1, width)
         head = f'${section}\n1\n"{_quoted(" ".join(name.split()))}"\n1\n0\n3\n0\n{width}\n{count}\n'
         found.append(head.encode() + rows.tobytes() + f"\n$End{section}\n".encode())
     return found

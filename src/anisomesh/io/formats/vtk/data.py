@@ -11,7 +11,10 @@ from anisomesh.io.carried import NORMAL, UV, Array, Carried
 from anisomesh.io.formats.vtk.arrays import ArrayReader
 
 NAMES_OF_REGIONS = "regions of "
-"""Beginning of the names of field data that make cell data a division: strings of a label, and a name after a space."""
+"""Beginning of the names of field data that make cell data a division.
+
+They are text in UTF-8 as bytes, since not every library reads strings: lines of a label and, after a space, its name.
+"""
 
 _ARRAY_TAGS = ("DataArray", "Array")  # the second of strings
 _MEANINGS = (  # attribute of the section, names of arrays in use, our name
@@ -80,8 +83,8 @@ def read_field_data(root: Element, kind: str, arrays: ArrayReader, carried: Carr
             continue
         with carried.optional(f"FieldData {name!r}"):
             values = arrays.read(element)
-            if name.startswith(NAMES_OF_REGIONS) and values.dtype.kind == "U":
-                names[name.removeprefix(NAMES_OF_REGIONS)] = _labels(values)
+            if name.startswith(NAMES_OF_REGIONS) and values.dtype == np.uint8:
+                names[name.removeprefix(NAMES_OF_REGIONS)] = _labels(values.tobytes().decode("utf-8", errors="replace"))
             else:
                 width = element.get("NumberOfComponents", "1")
                 shape = (-1, int(width)) if width.isdigit() and int(width) > 1 else (-1,)
@@ -91,9 +94,9 @@ def read_field_data(root: Element, kind: str, arrays: ArrayReader, carried: Carr
     return names
 
 
-def _labels(lines: Array) -> dict[int, str]:
+def _labels(text: str) -> dict[int, str]:
     found = {}
-    for line in lines.tolist():
+    for line in text.splitlines():
         match = re.fullmatch(r"(-?\d{1,18})(?: (.*))?", line)
         if match is None:
             raise ValueError(f"{line[:40]!r} is not a label and its name")

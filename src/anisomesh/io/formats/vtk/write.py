@@ -69,7 +69,8 @@ def _data(mesh: Mesh, losses: Losses) -> tuple[dict[str, Array], dict[str, Array
     fields = {}
     for name, division in mesh.regions.items():
         lines = [f"{label} {name_of(division, label)}" for label in division.names]
-        fields[NAMES_OF_REGIONS + name] = np.array(lines or [str(division.labels[0])])
+        text = "\n".join(lines or [str(division.labels[0])])
+        fields[NAMES_OF_REGIONS + name] = np.frombuffer(text.encode("utf-8", errors="replace"), np.uint8)
     given = mesh.materials.get("field_data", {})
     if isinstance(given, Mapping):
         fields |= _storable({name: np.asarray(values) for name, values in given.items()}, "field data", losses)
