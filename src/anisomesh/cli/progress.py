@@ -18,6 +18,7 @@ _STAGE_LABELS = {
     "cvt": "moving the sites",
     "dual": "building the triangles",
     "fit": "fitting them to the input",
+    "attributes": "carrying over attributes",
     "search": "searching the number of vertices",
 }
 _SECONDS_BETWEEN_LINES = 5.0  # heuristic

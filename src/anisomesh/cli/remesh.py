@@ -17,7 +17,7 @@ from anisomesh.cli.arguments import (
     Vertices,
     takes_remesh_options,
 )
-from anisomesh.cli.job import STANDARD_STREAM, Outputs, check_input_format, read, run_remesh
+from anisomesh.cli.job import STANDARD_STREAM, Outputs, check_input_format, read_mesh, run_remesh
 from anisomesh.cli.progress import progress
 from anisomesh.cli.report import as_json, hints, summary
 
@@ -75,16 +75,16 @@ def command(
     check_input_format(source, input_format)
     outputs.check(None if source == STANDARD_STREAM else source, features, None if weights is None else Path(weights))
     with progress(quiet) as display:
-        surface, seconds = read(source, input_format)
+        mesh, seconds = read_mesh(source, input_format)
         if features is not None:
             from anisomesh.features.tagged import load_pairs
 
             options["features"] = load_pairs(features)
         options |= {"n_vertices": n_vertices, "ratio": ratio}
-        options["max_error"] = None if error is None else error.on(surface)
+        options["max_error"] = None if error is None else error.on(mesh.surface)
         if weld is not None:
-            options["weld_tolerance"] = "auto" if gap is None else gap.on(surface)
-        result, facts = run_remesh(surface, display, name=str(source), load_seconds=seconds, **options)
+            options["weld_tolerance"] = "auto" if gap is None else gap.on(mesh.surface)
+        result, facts = run_remesh(mesh, display, name=str(source), load_seconds=seconds, **options)
         facts["hints"] = hints(result.prepared)
         facts["options"]["features"] = None if features is None else str(features)
         outputs.write(result, facts, display)
