@@ -117,7 +117,7 @@ def test_meshio_reads_what_we_write(tmp_path, suffix):
 def test_meshio_data(tmp_path, form, binary):
     number = np.arange(1, N_FACES + 1) % 4 + 1
     names = {"vtu": ("physical", "region")}.get(form, ("gmsh:physical", "gmsh:geometrical"))
-    data = {name: [np.full(len(FEATURES), 7), number] for name in names}
+    data = {name: [np.full(len(FEATURES), 7), number * (k + 1)] for k, name in enumerate(names)}
     data = {"medit:ref": data["gmsh:physical"]} if form == "medit" else data
     mesh = meshio.Mesh(
         SURFACE.points,
@@ -143,7 +143,7 @@ def test_meshio_data(tmp_path, form, binary):
         np.testing.assert_array_equal(read.regions[division].labels, number)
     if form == "gmsh22":
         assert read.regions["physical"].names == {2: "left"}
-        np.testing.assert_array_equal(read.regions["geometrical"].labels, number)
+        np.testing.assert_array_equal(read.regions["geometrical"].labels, 2 * number)
     assert rows(read.features) == rows(FEATURES)
     if form == "vtu" or (form != "medit" and binary):  # text by meshio 5.3.5 and NumPy 2 has np.float64(0.5)
         np.testing.assert_allclose(read.point_data["height"], HEIGHT, rtol=1e-10)

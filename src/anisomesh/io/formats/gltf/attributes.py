@@ -68,6 +68,7 @@ class Attributes:
     def together(self, carried: Carried) -> dict[str, Array]:
         """Return all attributes; where vertices lack one they are white, have 0 or NaN, or it is left out."""
         data: dict[str, Array] = {}
+        filled: list[str] = []
         for name in dict.fromkeys(name for _, attributes in self._parts for name in attributes):
             given = [attributes[name] for _, attributes in self._parts if name in attributes]
             lacks = len(given) < sum(count > 0 for count, _ in self._parts)
@@ -75,17 +76,19 @@ class Attributes:
                 carried.remarks.append(f"left out {name!r}, which some of its meshes lack")
                 continue
             with carried.optional(f"the attribute {name!r}"):
-                if name.startswith(COLOUR):
-                    data[name] = _colours(name, self._parts, given)
-                    continue
-                width = given[0].shape[1:]
-                fill = np.nan if given[0].dtype.kind == "f" and not name.startswith((UV, "WEIGHTS")) else 0
-                blank = [np.full((count, *width), fill, dtype=given[0].dtype) for count, _ in self._parts]
-                rows = [part.get(name, empty) for (_, part), empty in zip(self._parts, blank, strict=True)]
-                data[name] = np.concatenate(rows)
-                if lacks:
-                    carried.remarks.append(f"vertices without {name!r} get {fill}")
+                is_colour = name.startswith(COLOUR)
+                data[name] = _colours(name, self._parts, given) if is_colour else self._filled(name, given[0])
+            if lacks:
+                filled.append(name)
+        if filled:
+            carried.remarks.append(f"vertices of its meshes without {', '.join(filled)} get 0, NaN or white")
         return data
+
+    def _filled(self, name: str, example: Array) -> Array:
+        """Return an attribute of all vertices, of the width of an example."""
+        fill = np.nan if example.dtype.kind == "f" and not name.startswith((UV, "WEIGHTS")) else 0
+        blank = [np.full((count, *example.shape[1:]), fill, dtype=example.dtype) for count, _ in self._parts]
+        return np.concatenate([part.get(name, rows) for (_, part), rows in zip(self._parts, blank, strict=True)])
 
 
 def _colours(name: str, parts: list[tuple[int, dict[str, Array]]], given: list[Array]) -> Array:

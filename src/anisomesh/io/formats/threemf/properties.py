@@ -37,8 +37,22 @@ class Properties:
         self._known: dict[tuple[str, str], int] = {}
         self._colours: list[Integers] = []
 
-    def add(self, name: str, rows: Integers, default: tuple[int, int], model: _Groups) -> None:
-        """Add an object with the group and three members of each triangle (n, 4), in the groups of a model."""
+    def add(self, name: str, rows: Integers, default: tuple[int, int], model: _Groups, *, turned: bool) -> None:
+        """Add an object.
+
+        Parameters
+        ----------
+        name
+            Its name, empty for none.
+        rows
+            The group and three members of each triangle (n, 4).
+        default
+            Group and member of triangles without.
+        model
+            Where groups are looked up.
+        turned
+            Whether the corners are taken from last to first.
+        """
         self._names.append(name)
         self._counts.append(len(rows))
         rows = rows.copy()
@@ -46,6 +60,8 @@ class Properties:
         rows[without, 0] = default[0]
         rows[without & (rows[:, 1] == NONE), 1] = default[1]
         rows[:, 2:] = np.where(rows[:, 2:] == NONE, rows[:, 1:2], rows[:, 2:])
+        if turned:
+            rows = rows[:, [0, 3, 2, 1]]
         labels, colours = np.zeros(len(rows), dtype=np.int64), np.full((len(rows), 3, 4), 255, dtype=np.int64)
         for group in np.unique(rows[:, 0]).tolist():
             chosen = np.flatnonzero(rows[:, 0] == group)

@@ -109,12 +109,11 @@ class _Build:
             faces: Integers = np.array(found.faces, dtype=np.int64).reshape(-1, 3)
             if faces.min() < 0 or faces.max() >= len(points):
                 raise ValueError(f"a triangle of object {key[1]} refers to a point beyond its {len(points)} points")
-            if np.linalg.det(matrix[:3]) < 0.0:
-                faces = faces[:, ::-1]  # a reflection turns triangles inside out
             given = np.array(found.properties, dtype=np.int64).reshape(-1, 4)
-            if np.linalg.det(matrix[:3]) < 0.0:
-                given = given[:, [0, 3, 2, 1]]
-            self._properties.add(found.name, given, found.default, self.model(key[0]))
+            is_reflected = bool(np.linalg.det(matrix[:3]) < 0.0)
+            self._properties.add(found.name, given, found.default, self.model(key[0]), turned=is_reflected)
+            if is_reflected:
+                faces = faces[:, ::-1]  # a reflection turns triangles inside out
             self.cells.add("triangle", faces + self._n_points)
             moved = points if (matrix == np.eye(4, 3)).all() else points @ matrix[:3] + matrix[3]
             self.points.append(moved)
