@@ -150,6 +150,7 @@ KINDS = {
     "ascii.vtu": ASCII_VTU,
     "raw.vtp": RAW_VTP,
     "concave.obj": U_OBJ + "f 1 2 3 4 5 6 7 8\n",
+    "full.off": "STCNOFF\n3 1 0\n" + 3 * "0 0 1 0 0 1 9 8 7 1 .5 1\n" + "3 0 1 2 .5 .25 1 1\n",
     "full.obj": FULL_OBJ,
     "full.ply": FULL_PLY,
     "full.mesh": FULL_MEDIT,

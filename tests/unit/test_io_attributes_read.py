@@ -81,6 +81,19 @@ def test_ply(tmp_path, caplog):
     ]
 
 
+def test_off(tmp_path, caplog):
+    text = (
+        "STCNOFF\n3 1 0\n0 0 0 0 0 1 9 8 7 .5 1\n1 0 0 0 0 1 9 8 7 .5 1\n0 1 0 0 0 1 9 8 7 .5 1\n3 0 1 2 .5 .25 1 1\n"
+    )
+    mesh = read(tmp_path, "a.off", text)
+    np.testing.assert_array_equal(mesh.point_data["normal"], [[0, 0, 1]] * 3)
+    np.testing.assert_array_equal(mesh.point_data["color"], [[9, 8, 7]] * 3)
+    np.testing.assert_array_equal(mesh.point_data["uv"], [[0.5, 1]] * 3)
+    np.testing.assert_array_equal(mesh.face_data["color"], [[0.5, 0.25, 1, 1]])
+    assert mesh.point_data["color"].dtype == np.uint8
+    assert caplog.text == ""
+
+
 def test_stl(tmp_path):
     facet = "facet normal 0 0 1\nouter loop\nvertex {0} 0 0\nvertex {1} 0 0\nvertex {0} 1 0\nendloop\nendfacet\n"
     others = facet.format(2, 3) + facet.format(4, 5)
@@ -339,6 +352,8 @@ BROKEN = {
     "few colours.obj": ("v 0 0 0 1 1 1\nv 1 0 0\nv 0 1 0\nf 1 2 3\n", "left out the colours of points: not every"),
     "line.obj": ("v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\nl 1 9\n", "left out line 5: it reads"),
     "smoothing.obj": ("v 0 0 0\nv 1 0 0\nv 0 1 0\ns many\nf 1 2 3\n", "left out its smoothing groups"),
+    "colour map.off": (f"OFF\n4 2 0\n{POINTS}3 0 1 2 7\n3 1 3 2\n", "left out the colours of faces"),
+    "columns.off": (f"COFF\n4 2 0\n{POINTS}{TRIANGLES}", "left out the columns behind"),
     "edges.mesh": (MEDIT.replace("Edges\n4\n1 2", "Edges\n4\n1 x"), "left out the edges"),
     "required.mesh": (MEDIT.replace("RequiredEdges\n1\n3", "RequiredEdges\n1\n33"), "refers to number 33 of 4"),
     "short.mesh": (MEDIT.replace("Corners\n2", "Corners\n20"), "left out the section Corners: truncated"),

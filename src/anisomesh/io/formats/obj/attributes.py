@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import numpy as np
-import numpy.typing as npt
 
 from anisomesh.io.carried import COLOUR, NORMAL, UV, Carried, Integers
 from anisomesh.io.formats.obj.lines import Lines
@@ -29,16 +28,27 @@ def take_colours(file: Lines, carried: Carried) -> None:
             carried.point_data[COLOUR] = rows[:, 3:7]
 
 
-def take_corner_data(file: Lines, words: list[list[bytes]], sizes: Integers, carried: Carried) -> None:
-    """Add texture coordinates and normals, given by the corners of faces such as 1/2/3."""
-    flat = [word for row in words for word in row]
-    if not any(b"/" in word for word in flat):
-        return
-    indices: npt.NDArray[np.int64] | None = None
-    with carried.optional("texture coordinates and normals"):
-        indices = _indices(flat)
-    if indices is None:
-        return
+def corner_numbers(words: list[bytes]) -> Integers | None:
+    """Return the numbers of point, texture and normal of corners (n, 3), if all are written as 1/2/3."""
+    text = b" ".join(words)
+    if text.count(b"/") != 2 * len(words) or any(word.count(b"/") != 2 for word in words):
+        return None
+    try:
+        numbers = np.array(list(map(int, text.replace(b"/", b" ").split())), dtype=np.int64)
+    except (ValueError, OverflowError):
+        return None
+    return numbers.reshape(-1, 3) if numbers.size == 3 * len(words) else None
+
+
+def take_corner_data(file: Lines, words: list[list[bytes]] | Integers, sizes: Integers, carried: Carried) -> None:
+    """Add texture coordinates and normals, given by the corners of faces such as 1/2/3 or their numbers (n, 3)."""
+    indices: Integers = np.zeros((0, 3), dtype=np.int64)
+    if not isinstance(words, list):
+        indices = words
+    elif any(b"/" in word for row in words for word in row):
+        with carried.optional("texture coordinates and normals"):
+            parts = [[int(part) if part else 0 for part in word.split(b"/")[:3]] for row in words for word in row]
+            indices = np.array([[*row, *[0] * (3 - len(row))] for row in parts], dtype=np.int64)
     for column, word, name, widths in ((1, b"vt", UV, (2, 3)), (2, b"vn", NORMAL, (3, 3))):
         chosen = indices[:, column]
         if not chosen.any():
@@ -62,17 +72,6 @@ def take_corner_data(file: Lines, words: list[list[bytes]], sizes: Integers, car
             if missing.any():
                 carried.remarks.append(f"{np.count_nonzero(missing)} corner(s) of faces have no {name} and get 0")
             carried.corner_data[name] = rows
-
-
-def _indices(words: list[bytes]) -> Integers:
-    """Return the numbers of point, texture and normal of corners (n, 3), 0 for none."""
-    count = words[0].count(b"/")
-    if all(word.count(b"/") == count for word in words):
-        text = b" ".join(words)
-        if count == 2 and b"//" not in text and b"/ " not in text and not text.endswith(b"/"):
-            return np.array(list(map(int, text.replace(b"/", b" ").split())), dtype=np.int64).reshape(-1, 3)
-    rows = [[int(part) if part else 0 for part in word.split(b"/")[:3]] for word in words]
-    return np.array([[*row, *[0] * (3 - len(row))] for row in rows], dtype=np.int64)
 
 
 def take_divisions(file: Lines, carried: Carried) -> None:

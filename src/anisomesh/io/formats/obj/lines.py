@@ -31,8 +31,10 @@ class Lines:
 
     def of(self, word: bytes) -> Integers:
         """Return the numbers of the lines that begin with a word."""
-        place = np.flatnonzero(np.isin(self.kinds, [(word + b" ")[:2], word[:2]]))
-        return np.array([k for k in place if self.lines[k].split(None, 1)[:1] == [word]], dtype=np.int64)
+        place = np.flatnonzero((self.kinds == (word + b" ")[:2]) | (self.kinds == word[:2]))
+        n, after = len(word), b" \t"
+        found = [k for k in place.tolist() if (line := self.lines[k].lstrip())[:n] == word and line[n : n + 1] in after]
+        return np.array(found, dtype=np.int64)
 
     def rest(self, number: int) -> str:
         """Return what follows the first word of a line."""
@@ -41,7 +43,7 @@ class Lines:
 
     def numbers(self, chosen: Integers) -> npt.NDArray[np.float64]:
         """Return the numbers of some lines (n, k), as many as the shortest of them has."""
-        rows = [self.lines[k].partition(b"#")[0].split()[1:] for k in chosen]
-        width = min(map(len, rows))
-        table = np.array([list(map(float, row[:width])) for row in rows], dtype=np.float64)
+        rows = [self.lines[k].partition(b"#")[0].split() for k in chosen]
+        width = min(map(len, rows)) - 1
+        table = np.array([float(word) for row in rows for word in row[1 : 1 + width]], dtype=np.float64)
         return table.reshape(len(rows), width)

@@ -8,7 +8,13 @@ import numpy as np
 import numpy.typing as npt
 
 from anisomesh.io.carried import Carried, Integers
-from anisomesh.io.formats.obj.attributes import take_colours, take_corner_data, take_divisions, take_lines
+from anisomesh.io.formats.obj.attributes import (
+    corner_numbers,
+    take_colours,
+    take_corner_data,
+    take_divisions,
+    take_lines,
+)
 from anisomesh.io.formats.obj.lines import Lines
 from anisomesh.io.formats.words import coordinates, integers
 from anisomesh.io.polygons import PolygonSoup
@@ -41,22 +47,26 @@ def read_obj(data: bytes) -> PolygonSoup:
     sizes = np.array([len(row) for row in words], dtype=np.int64)
     if len(sizes) and sizes[-1] < 3 and face_lines[-1] == len(lines) - 1 and not data.endswith(_ENDS_OF_LINES):
         raise ValueError(f"truncated: the last line is a face of {sizes[-1]} corners: {lines[-1][:40]!r}")
-    corners = _point_indices(words, face_lines, sizes, point_lines)
+    numbers = corner_numbers([word for row in words for word in row])
+    corners = _point_indices(words if numbers is None else numbers, face_lines, sizes, point_lines)
     curved = [line.split(None, 1)[0].decode() for line in lines if line.startswith(_CURVED)]
     remarks = (f"left out {len(curved)} free-form surface(s) ({curved[0]})",) if curved else ()
     carried, file = Carried(), Lines(lines, kinds, point_lines, face_lines)
     take_colours(file, carried)
-    take_corner_data(file, words, sizes, carried)
+    take_corner_data(file, words if numbers is None else numbers, sizes, carried)
     take_divisions(file, carried)
     take_lines(file, carried)
     return PolygonSoup(points=points, corners=corners, sizes=sizes, remarks=remarks, carried=carried)
 
 
 def _point_indices(
-    words: list[list[bytes]], face_lines: Integers, sizes: Integers, point_lines: npt.NDArray[np.intp]
+    words: list[list[bytes]] | Integers, face_lines: Integers, sizes: Integers, point_lines: npt.NDArray[np.intp]
 ) -> Integers:
-    """Return the indices of points of all corners, from 0."""
-    raw = integers([[word.partition(b"/")[0] for word in row] for row in words], face_lines)
+    """Return the indices of points of all corners, from 0; the first column if numbers (n, 3) are given."""
+    if isinstance(words, list):
+        raw = integers([[word.partition(b"/")[0] for word in row] for row in words], face_lines)
+    else:
+        raw = words[:, 0]
     if (raw == 0).any():
         line = np.repeat(face_lines, sizes)[np.flatnonzero(raw == 0)[0]]
         raise ValueError(f"line {line + 1} refers to point 0; OBJ counts from 1")
