@@ -82,9 +82,8 @@ def test_ply(tmp_path, caplog):
 
 
 def test_off(tmp_path, caplog):
-    text = (
-        "STCNOFF\n3 1 0\n0 0 0 0 0 1 9 8 7 .5 1\n1 0 0 0 0 1 9 8 7 .5 1\n0 1 0 0 0 1 9 8 7 .5 1\n3 0 1 2 .5 .25 1 1\n"
-    )
+    points = "".join(f"{point} 0 0 1 9 8 7 .5 1\n" for point in POINTS.splitlines()[:3])
+    text = f"STCNOFF\n3 1 0\n{points}3 0 1 2 .5 .25 1 1\n"
     mesh = read(tmp_path, "a.off", text)
     np.testing.assert_array_equal(mesh.point_data["normal"], [[0, 0, 1]] * 3)
     np.testing.assert_array_equal(mesh.point_data["color"], [[9, 8, 7]] * 3)
