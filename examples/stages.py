@@ -11,9 +11,12 @@ import numpy as np
 
 import anisomesh
 from anisomesh.features.detect import sharp_edges
+from anisomesh.fitting.target import FitTarget
+from anisomesh.fitting.valid import fit_without_faults
 from anisomesh.mesh.distance import surface_distance
 from anisomesh.mesh.geometry import unit_frame
 from anisomesh.mesh.validity import check_validity
+from anisomesh.metric.transfer import PlacedMetric
 from anisomesh.viz import side_by_side, stretch_colouring
 
 
@@ -55,13 +58,13 @@ def main(out: str = "stages.png", n_vertices: int = 600) -> anisomesh.Surface:
     print(f"dual: {dual.n_points:,} vertices, RMS distance {1e4 * surface_distance(surface, dual).rms:.2f}e-4")
 
     # 6. Fit: less distance and better triangles with the same number of vertices
-    target = anisomesh.FitTarget.of(
+    target = FitTarget.of(
         task.reference,
-        anisomesh.PlacedMetric(task.reference, field),
+        PlacedMetric(task.reference, field),
         n_vertices,
         corners=task.corner_places,
     )
-    fitted = anisomesh.fit_without_faults(dual, target, crease_edges=mesh.crease_edges)
+    fitted = fit_without_faults(dual, target, crease_edges=mesh.crease_edges)
     validity = check_validity(fitted, surface)
     print(f"fitted: RMS distance {1e4 * surface_distance(surface, fitted).rms:.2f}e-4, closed: {validity.closed}")
 

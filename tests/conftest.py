@@ -25,26 +25,17 @@ hypothesis.settings.load_profile(os.environ.get("HYPOTHESIS_PROFILE") or ("ci" i
 
 CLI = [sys.executable, "-m", "anisomesh"]
 
-_COMPILE = (
-    "import anisomesh; from anisomesh.shapes.analytic import box, sphere\n"
-    "for shape in (sphere(3), box((9.0, 1.0, 1.0), n=1)): anisomesh.remesh(shape, n_vertices=300, embedding='direct')",
-    "import anisomesh; from anisomesh.shapes.analytic import sphere; ball = sphere(3)\n"
-    "anisomesh.evaluate(ball, ball, samples=100)\n"
-    "from anisomesh.learn.inference.predict import predict\n"
-    "predict(ball.with_points(ball.points / ball.diagonal))",
-)
-"""Programs that together compile nearly all kernels."""
-
 
 def pytest_sessionstart(session: pytest.Session) -> None:
     """Compile the kernels before several workers start, which would compile the same ones at the same time."""
     if session.config.getoption("numprocesses", None) and not hasattr(session.config, "workerinput"):
         from anisomesh._kernels.warmup import kernels_cached
 
-        if not kernels_cached("evaluate"):  # the last kernels that both programs compile
-            programs = [subprocess.Popen([sys.executable, "-c", code], stderr=subprocess.DEVNULL) for code in _COMPILE]
+        if not all(map(kernels_cached, ("remesh", "fit", "decimate", "evaluate"))):
+            command = [sys.executable, str(Path(__file__).with_name("compile_kernels.py"))]
+            programs = [subprocess.Popen([*command, part]) for part in ("first", "second")]
             for program in programs:
-                program.wait()  # without torch the second one fails, and the tests are skipped
+                program.wait()
 
 
 def examples(number: int) -> hypothesis.settings:

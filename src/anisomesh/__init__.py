@@ -13,6 +13,8 @@ import importlib
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
+    from anisomesh.attributes.model import Mesh, Regions
+    from anisomesh.attributes.transfer import transfer_attributes
     from anisomesh.conformance import ConformanceError, check_embedder, check_energy_gradient, check_metric_source
     from anisomesh.cvt.energy import NormalMetric
     from anisomesh.cvt.polygon_energy import energy_from_kernel
@@ -25,21 +27,17 @@ if TYPE_CHECKING:
     from anisomesh.evaluation.report import Evaluation, evaluate
     from anisomesh.execution.progress import StepInfo
     from anisomesh.features.network import trace_features
-    from anisomesh.fitting.target import FitTarget
-    from anisomesh.fitting.valid import fit_without_faults
     from anisomesh.io.meshes import load, load_mesh, save
     from anisomesh.learn.inference.source import Hybrid, Neural
     from anisomesh.mesh.embedded_surface import EmbeddedSurface
     from anisomesh.mesh.surface import Surface
     from anisomesh.metric.field import MetricField
     from anisomesh.metric.sources import Approximation, Curvature, Uniform
-    from anisomesh.metric.transfer import PlacedMetric
     from anisomesh.options import RemeshOptions
     from anisomesh.pipeline import remesh
     from anisomesh.repair.prepare import prepare
     from anisomesh.result import RemeshResult, save_rvd
     from anisomesh.shapes.analytic import sample
-    from anisomesh.viz import side_by_side
     from anisomesh.voronoi.restricted import EnergyValue, RestrictedVoronoi
 
     __version__: str
@@ -50,8 +48,11 @@ _MODULE_OF = {
     "RemeshOptions": "options",
     "RemeshResult": "result",
     "StepInfo": "execution.progress",
-    # meshes in and out, judged and drawn
+    # meshes in and out, and judged
     "Surface": "mesh.surface",
+    "Mesh": "attributes.model",
+    "Regions": "attributes.model",
+    "transfer_attributes": "attributes.transfer",
     "load": "io.meshes",
     "load_mesh": "io.meshes",
     "save": "io.meshes",
@@ -59,7 +60,6 @@ _MODULE_OF = {
     "sample": "shapes.analytic",
     "evaluate": "evaluation.report",
     "Evaluation": "evaluation.report",
-    "side_by_side": "viz",
     # the stages by themselves
     "prepare": "repair.prepare",
     "MetricField": "metric.field",
@@ -81,9 +81,6 @@ _MODULE_OF = {
     "optimise_sites": "cvt.schedule",
     "MeshingTask": "delaunay.meshing",
     "mesh_from_sites": "delaunay.meshing",
-    "PlacedMetric": "metric.transfer",
-    "FitTarget": "fitting.target",
-    "fit_without_faults": "fitting.valid",
     # conformance tests of plug-ins
     "check_metric_source": "conformance",
     "check_embedder": "conformance",
@@ -108,8 +105,8 @@ __all__ = [
     "Embedding",
     "EnergyValue",
     "Evaluation",
-    "FitTarget",
     "Hybrid",
+    "Mesh",
     "MeshError",
     "MeshFileError",
     "MeshingTask",
@@ -118,7 +115,7 @@ __all__ = [
     "Neural",
     "NormalMetric",
     "OptionError",
-    "PlacedMetric",
+    "Regions",
     "RemeshOptions",
     "RemeshResult",
     "RestrictedVoronoi",
@@ -131,7 +128,6 @@ __all__ = [
     "check_metric_source",
     "energy_from_kernel",
     "evaluate",
-    "fit_without_faults",
     "load",
     "load_mesh",
     "mesh_from_sites",
@@ -142,8 +138,8 @@ __all__ = [
     "sample",
     "save",
     "save_rvd",
-    "side_by_side",
     "trace_features",
+    "transfer_attributes",
 ]
 
 

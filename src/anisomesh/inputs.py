@@ -19,6 +19,7 @@ from anisomesh.mesh.geometry import even_edge_length
 from anisomesh.mesh.surface import Surface
 from anisomesh.metric.tensors import validate_metric
 from anisomesh.options import RemeshOptions
+from anisomesh.repair.near_points import weld_distance
 from anisomesh.repair.prepare import Prepared, prepare
 from anisomesh.resolve import follows_creases, is_designed
 
@@ -97,7 +98,7 @@ def prepared_input(mesh: Mesh, options: RemeshOptions) -> PreparedInput:
             raise OptionError(
                 f"density[{where}] = {value:g}; expected a positive weight for each point, below {_LARGEST_DENSITY:g}"
             )
-    prescribed = [pairs for pairs in (options.features, mesh.features) if pairs is not None]
+    prescribed = [mesh.features, *([] if options.features is None else [options.features])]
     borders, seams = _borders(mesh, prepared.surface, options)
     return PreparedInput(
         prepared=prepared,
@@ -116,8 +117,7 @@ def _tagged(
     """Return the edges (E,) of the prepared surface that are in any of some lists of edges of the input (n, 2)."""
     tagged = np.zeros(len(prepared.edges), dtype=bool)
     for pairs in prescribed:
-        if np.size(pairs):
-            tagged |= tagged_edges(surface, pairs, prepared, options.weld_tolerance)
+        tagged |= tagged_edges(surface, pairs, prepared, options.weld_tolerance)
     return tagged
 
 
@@ -129,7 +129,7 @@ def _borders(mesh: Mesh, prepared: Surface, options: RemeshOptions) -> tuple[Edg
     borders, seams = np.zeros((2, len(prepared.edges)), dtype=bool)
     if not options.attributes or not options.regions or not (mesh.regions or mesh.corner_data or mesh.point_data):
         return borders, seams
-    joints = Joints(mesh.surface)
+    joints = Joints(mesh.surface, weld_distance(mesh.surface, options.weld_tolerance))
     lines = [joints.region_borders(mesh.parts)] if mesh.regions else []
     borders = _tagged(lines, mesh.surface, prepared, options)
     corner_data = with_seams_at_corners(mesh, joints).corner_data

@@ -95,7 +95,8 @@ class RemeshOptions:
         Whether edges of the result follow the borders between regions of a :class:`~anisomesh.attributes.model.Mesh`
         and the seams of its corner data, also where the surface is smooth.
     attributes
-        Whether the result has everything that a :class:`~anisomesh.attributes.model.Mesh` carries.
+        Whether the result has everything that a :class:`~anisomesh.attributes.model.Mesh` carries. If not, the mesh
+        is taken for a mere surface, but for its features and fixed points.
     time_limit
         Wall-clock seconds after which the optimisation and the repair of faults end with what they have; the first
         60 % are for the optimisation. What a valid mesh needs is done regardless, so a run may take somewhat longer.

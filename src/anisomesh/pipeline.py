@@ -55,7 +55,7 @@ def remesh(
     Parameters
     ----------
     mesh
-        Points (V, 3) together with ``faces``, or what :func:`~anisomesh.io.convert.as_surface` takes; or a
+        Points (V, 3) together with ``faces``, or what :func:`~anisomesh.io.convert.as_surface` takes, or a
         :class:`Mesh`, of which the result has everything in its ``mesh``.
     faces
         Triangles (F, 3), if the first argument is an array of points.

@@ -65,8 +65,8 @@ class RemeshResult:
     distance
         Largest distance between result and input, both ways, in model units; None unless ``max_error`` was given.
     feature_distance
-        Largest distance from the edges in ``features`` to edges of the result that follow them, in model units; 0
-        without such edges, infinite if they are lost.
+        Largest distance from the edges in ``features``, and the borders of regions and seams that are followed, to
+        edges of the result that follow them, in model units; 0 without such edges, infinite if they are lost.
     seconds
         Wall-clock seconds per stage.
     warnings

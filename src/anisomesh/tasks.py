@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -77,7 +77,7 @@ def set_up(source: PreparedInput, n: int, options: RemeshOptions, run: Run, *, n
         surface = prepared.surface.with_points(frame.to_unit(prepared.surface.points))
         options = with_embedding_chosen(options, surface)
         tagged, remarks = source.features_at(n)
-        surface = _with_smooth_borders(surface, source, tagged, options.feature_angle)
+        surface, tagged = _with_smooth_borders(surface, source, tagged, options.feature_angle)
         creases = sharp_edges(surface, min(options.feature_angle, WEAK_ANGLE))
         creases |= source.fixed[surface.edges].any(axis=1)  # so that the points stay
         split = working_surface(surface, n, creases=creases, tagged=tagged)
@@ -91,6 +91,7 @@ def set_up(source: PreparedInput, n: int, options: RemeshOptions, run: Run, *, n
         working = split.surface
         if field.points is not None:
             working = working.with_points(field.points)
+            tagged = split.coarse_tagged
             surface = split.coarse.with_points(field.points[: split.coarse.n_points])
         field = limit_to_patches(field, working, n)
     with run.stage("embed"):
@@ -107,7 +108,8 @@ def set_up(source: PreparedInput, n: int, options: RemeshOptions, run: Run, *, n
             deadline=run.deadline,
         )
         plan = fit_plan(options, surface, nearest=nearest)
-        target = None if plan is None else _fit_target(task, working, field, plan, options.feature_angle)
+        metric, prescribed = PlacedMetric(ClosestPoints(working), field), bool(source.tagged.any())
+        target = None if plan is None else _fit_target(task, tagged, metric, plan, options, prescribed=prescribed)
     return Tasks(
         options=options,
         frame=frame,
@@ -120,32 +122,46 @@ def set_up(source: PreparedInput, n: int, options: RemeshOptions, run: Run, *, n
     )
 
 
-def _with_smooth_borders(surface: Surface, source: PreparedInput, followed: EdgeMask, crease_angle: float) -> Surface:
-    """Return a surface with smoother borders and seams among the edges (E,) that are followed, unless it is designed.
+def _with_smooth_borders(
+    surface: Surface, source: PreparedInput, followed: EdgeMask, crease_angle: float
+) -> tuple[Surface, EdgeMask]:
+    """Return a surface with smoother borders and seams among the edges (E,) that are followed, and these edges.
 
-    On a scan these go around triangles, which are smaller than the ones of the result.
+    On a scan they go around triangles, which are smaller than the ones of the result; designed surfaces stay.
     """
     lines = followed & ~source.tagged
     if not lines.any() or is_designed(surface):
-        return surface
+        return surface, followed
+    creases = sharp_edges(surface, crease_angle)
     fixed = surface.on_boundary | source.fixed
-    fixed[surface.edges[source.tagged | sharp_edges(surface, crease_angle)]] = True
-    return with_smooth_lines(surface, lines, fixed)
+    fixed[surface.edges[source.tagged | creases]] = True
+    surface, (lines, tagged, _) = with_smooth_lines(surface, lines, (source.tagged, creases), fixed)
+    return surface, lines | tagged
 
 
 def _fit_target(
-    task: MeshingTask, working: Surface, field: MetricField, plan: FitPlan, crease_angle: float
+    task: MeshingTask,
+    tagged: EdgeMask,
+    metric: PlacedMetric,
+    plan: FitPlan,
+    options: RemeshOptions,
+    *,
+    prescribed: bool,
 ) -> FitTarget:
-    """Return what meshes are fitted to; the field is on the working surface."""
-    return FitTarget.of(
+    """Return what meshes are fitted to, with ``tagged`` edges (E,) of the surface to mesh.
+
+    If edges are ``prescribed`` by a user all creases are held, else only borders and seams.
+    """
+    target = FitTarget.of(
         task.reference,
-        PlacedMetric(ClosestPoints(working), field),
+        metric,
         task.n_vertices,
         corners=task.corner_places,
-        holds_creases=bool(task.features.required.any()),
-        crease_angle=crease_angle,
+        holds_creases=prescribed and bool(task.features.required.any()),
+        crease_angle=options.feature_angle,
         plan=plan,
     )
+    return replace(target, lines=task.surface.edges[tagged].astype(np.int64))
 
 
 def _features(

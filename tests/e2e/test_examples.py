@@ -25,7 +25,7 @@ def stretch_along_z():
 
 
 def test_every_example_is_tested():
-    tested = {"remesh_a_surface", "own_metric", "gallery", "noisy_scan"}
+    tested = {"remesh_a_surface", "own_metric", "gallery", "noisy_scan", "carry_data"}
     tutorials = {"own_metric_source", "own_energy", "own_embedder", "stages", "learn_a_metric"}
     assert {path.stem for path in FOLDER.glob("*.py")} == tested | tutorials
 
@@ -129,3 +129,11 @@ def test_learn_a_metric_finds_the_stretch_of_the_given_mesh(tmp_path, capsys):
     given, remeshed = (float(line.split("mean stretch ")[1]) for line in lines[2:4])
     assert remeshed == pytest.approx(given, rel=0.15)
     assert (tmp_path / "learned.png").stat().st_size > 10_000
+
+
+@pytest.mark.slow
+def test_carry_data_loses_nothing(capsys):
+    result = example("carry_data").main(n_vertices=150)
+    load = result.mesh.regions["group"].labels == 6
+    assert abs(result.surface.face_areas[load].sum() - 1.0) < 1e-9
+    assert "area 1.000000 (1 before)" in capsys.readouterr().out

@@ -11,11 +11,11 @@ import numpy.typing as npt
 from anisomesh.attributes.model import Array
 from anisomesh.mesh.geometry import unit
 
-_COLOUR = re.compile(r"colou?r|rgb", re.IGNORECASE)
-_DIRECTION = re.compile(r"normal|tangent", re.IGNORECASE)
-_SHARES = re.compile(r"weight", re.IGNORECASE)
-_JOINTS = re.compile(r"joints", re.IGNORECASE)
-_TOLERANCE = 1e-2  # deviation of lengths of unit vectors and of sums of shares from 1, in files of half precision
+_COLOUR_NAME = re.compile(r"colou?r|rgb", re.IGNORECASE)
+_DIRECTION_NAME = re.compile(r"normal|tangent", re.IGNORECASE)
+_WEIGHT_NAME = re.compile(r"weight", re.IGNORECASE)
+_JOINTS_NAME = re.compile(r"joints", re.IGNORECASE)
+_UNIT_TOLERANCE = 1e-2  # deviation of lengths of unit vectors and of sums of shares from 1, in files of half precision
 
 Floats = npt.NDArray[np.float64]
 
@@ -40,12 +40,12 @@ class Blend:
 
     def __init__(self, name: str, values: Array) -> None:
         self._dtype, kind, width = values.dtype, values.dtype.kind, values.shape[-1] if values.ndim > 1 else 1
-        self._rounds = kind in "iu" and bool(_COLOUR.search(name))
+        self._rounds = kind in "iu" and bool(_COLOUR_NAME.search(name))
         self._nearest = kind not in "fc" and not self._rounds
         rows = values.reshape(-1, width) if kind == "f" else np.zeros((0, 1))
-        self._directs = bool(_DIRECTION.search(name)) and _is_unit(rows)
-        shares = bool(_SHARES.search(name)) and width > 1 and len(rows) > 0 and bool((rows >= 0.0).all())
-        self._shares = shares and bool((np.abs(rows.sum(axis=1) - 1.0) < _TOLERANCE).all())
+        self._directs = bool(_DIRECTION_NAME.search(name)) and _is_unit(rows)
+        shares = bool(_WEIGHT_NAME.search(name)) and width > 1 and len(rows) > 0 and bool((rows >= 0.0).all())
+        self._shares = shares and bool((np.abs(rows.sum(axis=1) - 1.0) < _UNIT_TOLERANCE).all())
 
     def at(self, corners: Array, weights: Floats, nearest: npt.NDArray[np.int64]) -> Array:
         """Return the values (n, ...) between the values at corners (n, 3, ...), with barycentric weights (n, 3).
@@ -74,14 +74,14 @@ def _is_unit(rows: Array) -> bool:
     """Return whether rows (n, k) are vectors of length 1, with a sign or without."""
     if len(rows) == 0 or rows.shape[1] not in (3, 4):
         return False
-    return bool((np.abs(np.linalg.norm(rows[:, :3], axis=1) - 1.0) < _TOLERANCE).all())
+    return bool((np.abs(np.linalg.norm(rows[:, :3], axis=1) - 1.0) < _UNIT_TOLERANCE).all())
 
 
 def skin_sets(data: Mapping[str, Array]) -> list[tuple[str, str]]:
     """Return the pairs of names of joints and their weights, as JOINTS_0 and WEIGHTS_0 of glTF."""
     found = []
     for name in sorted(data):
-        other = _JOINTS.sub(lambda word: "WEIGHTS" if word[0].isupper() else "weights", name)
+        other = _JOINTS_NAME.sub(lambda word: "WEIGHTS" if word[0].isupper() else "weights", name)
         if other == name or other not in data:
             continue
         joints, shares = data[name], data[other]

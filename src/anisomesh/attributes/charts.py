@@ -22,13 +22,13 @@ Mask = npt.NDArray[np.bool_]
 
 
 class Joints:
-    """How the faces of a surface are joined at sides whose end points coincide."""
+    """How the faces of a surface are joined at sides whose end points coincide, up to a distance in model units."""
 
-    def __init__(self, surface: Surface) -> None:
+    def __init__(self, surface: Surface, distance: float = 0.0) -> None:
         self.surface = surface
         used = np.unique(surface.faces)
         self.place = np.arange(surface.n_points)
-        self.place[used] = used[coincident(surface.points[used])]
+        self.place[used] = used[coincident(surface.points[used], distance)]
 
     @cached_property
     def _faces(self) -> Faces:

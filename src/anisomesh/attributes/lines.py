@@ -14,7 +14,7 @@ from anisomesh.mesh.surface import Surface
 
 _MAX_END_DISTANCE = 0.01  # edge lengths of an end of an edge from the lines that it follows; heuristic
 _MAX_MIDDLE_DISTANCE = 0.1  # the same of its middle: chords of curved lines; heuristic
-_MIN_COSINE = 0.7  # between an edge and the line at its middle; heuristic
+_MIN_LINE_COSINE = 0.7  # between an edge and the line at its middle; heuristic
 
 
 def transfer_lines(lines: Floats, target: Surface) -> EdgeEnds:
@@ -30,7 +30,7 @@ def transfer_lines(lines: Floats, target: Surface) -> EdgeEnds:
     )
     distance, line = _distances(ends[near].mean(axis=1), lines)
     along = unit(ends[near, 1] - ends[near, 0]), unit(lines[line, 1] - lines[line, 0])
-    follows = np.abs(np.einsum("nx,nx->n", *along)) >= _MIN_COSINE
+    follows = np.abs(np.einsum("nx,nx->n", *along)) >= _MIN_LINE_COSINE
     chosen = near[follows & (distance <= _MAX_MIDDLE_DISTANCE * limit[near])]
     return np.asarray(target.edges[chosen], dtype=np.int64)
 

@@ -17,7 +17,7 @@ _REACH = 0.5  # roots of the area of a face: how far off a sheet that faces its 
 _DETOUR = 0.1  # roots of the area of a face, by which a walk may end farther off than the surface is; heuristic
 _A, _B, _C, _D = 0.059715871789770, 0.470142064105115, 0.797426985353087, 0.101286507323456
 _PLACES = np.array([[1 / 3] * 3, [_A, _B, _B], [_B, _A, _B], [_B, _B, _A], [_C, _D, _D], [_D, _C, _D], [_D, _D, _C]])
-_SHARES = np.array([0.225, *[0.132394152788506] * 3, *[0.125939180544827] * 3])  # with these, exact up to degree 5
+_AREA_SHARES = np.array([0.225, *[0.132394152788506] * 3, *[0.125939180544827] * 3])  # with these, exact up to degree 5
 
 
 @dataclass(frozen=True, eq=False)
@@ -133,6 +133,6 @@ def majority(codes: Ints) -> Ints:
     if len(codes) == 0 or codes.max() == codes.min():
         return codes[:, 0].copy()
     same = codes[:, :, None] == codes[:, None, :]
-    shares = np.round(same @ _SHARES, 12)
+    shares = np.round(same @ _AREA_SHARES, 12)
     tied = shares == shares.max(axis=1, keepdims=True)
     return np.asarray(np.where(tied, codes, codes.max()).min(axis=1))

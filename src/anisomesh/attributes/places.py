@@ -18,7 +18,7 @@ _OPPOSED_COSINE = -0.1  # between normals of point and face, below which another
 _AGREEING_COSINE = 0.1  # from which on the other sheet faces the way of the point; heuristic
 _MAX_STEPS = 300  # faces that a walk crosses
 _OUTSIDE = 1e-12  # barycentric coordinate below which a walk goes on: rounding
-_FLAT = 1e-30  # squared sine of a corner of a face that has no plane
+_FLAT_SINE_SQUARED = 1e-30  # squared sine of a corner of a face that has no plane
 
 Floats = npt.NDArray[np.float64]
 Mask = npt.NDArray[np.bool_]
@@ -120,7 +120,9 @@ class Divided:
         facet, weights = np.zeros(len(points), dtype=np.int64), np.zeros((len(points), 3))
         order = np.argsort(parts, kind="stable")
         numbers, first = np.unique(parts[order], return_index=True)
-        for number, rows in zip(numbers.tolist(), np.split(order, first[1:]), strict=True):
+        ends = np.append(first, len(order))[1:]
+        for number, start, end in zip(numbers.tolist(), first, ends, strict=True):
+            rows = order[start:end]
             facet[rows], weights[rows] = self._part(number).locate(points[rows], normals[rows], reach[rows])
         return facet, weights
 
@@ -212,7 +214,7 @@ def _projected(corners: Floats, points: Points) -> Floats:
     square = np.einsum("nx,nx->n", normal, normal)
     offset = points - corners[:, 0]
     lengths = np.einsum("nx,nx->n", first, first) * np.einsum("nx,nx->n", second, second)
-    flat = ~(square > _FLAT * lengths)
+    flat = ~(square > _FLAT_SINE_SQUARED * lengths)
     square = np.where(flat, 1.0, square)
     b = np.einsum("nx,nx->n", np.cross(offset, second), normal) / square
     c = np.einsum("nx,nx->n", np.cross(first, offset), normal) / square

@@ -13,7 +13,8 @@ class StepInfo:
     Attributes
     ----------
     stage
-        ``"load"``, ``"prepare"``, ``"metric"``, ``"embed"``, ``"cvt"``, ``"dual"``, ``"fit"`` or ``"search"``.
+        ``"load"``, ``"prepare"``, ``"metric"``, ``"embed"``, ``"cvt"``, ``"dual"``, ``"fit"``,
+        ``"attributes"`` or ``"search"``.
     iteration, total
         Iterations done, and an upper bound on them; 0 where a stage has none.
     energy

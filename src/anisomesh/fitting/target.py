@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass, field
 
+import igl
 import numpy as np
 from scipy.spatial import cKDTree
 
@@ -35,6 +36,8 @@ class FitTarget:
         Corners of its creases, and apexes (n, 3): points of a mesh that are at one stay there.
     holds_creases
         Whether points on creases stay, since they were prescribed and the shape may not tell where they are.
+    lines
+        Edges of the surface, as pairs of its points (n, 2): only points on these stay, and the edges between them.
     crease_angle
         Edges that bend by more degrees are creases, along which points only slide; 180 for none.
     plan
@@ -45,6 +48,7 @@ class FitTarget:
     samples: SurfaceSamples
     corners: Points
     holds_creases: bool = False
+    lines: EdgeEnds = field(default_factory=lambda: np.zeros((0, 2), dtype=np.int64))
     crease_angle: float = 40.0
     plan: FitPlan = field(default_factory=FitPlan)
 
@@ -98,9 +102,17 @@ class FitTarget:
     def task(self, mesh: Surface, crease_edges: EdgeEnds) -> FitTask:
         """Return the task to fit a mesh with these edges (n, 2) along creases."""
         held = self.at_corners(mesh.points)
-        if self.holds_creases:
-            held[crease_edges] = True
-        kept = np.zeros(len(mesh.edges), dtype=bool)
-        if self.holds_creases:
-            kept = np.isin(edge_keys(mesh.edges), edge_keys(crease_edges))
+        stays = crease_edges if self.holds_creases else self._on_lines(mesh, crease_edges)
+        held[stays] = True
+        kept = np.isin(edge_keys(mesh.edges), edge_keys(stays))
         return FitTask(mesh=mesh, held=held, kept=kept, crease_angle=self.crease_angle)
+
+    def _on_lines(self, mesh: Surface, crease_edges: EdgeEnds) -> EdgeEnds:
+        """Return which edges of a mesh along creases (n, 2) are along the lines."""
+        if len(self.lines) == 0 or len(crease_edges) == 0:
+            return crease_edges[:0]
+        points = np.unique(crease_edges)
+        near = np.zeros(mesh.n_points, dtype=bool)
+        squares, _, _ = igl.point_mesh_squared_distance(mesh.points[points], self.reference.surface.points, self.lines)
+        near[points] = np.asarray(squares) < _SAME_PLACE**2
+        return np.asarray(crease_edges[near[crease_edges].all(axis=1)])

@@ -22,7 +22,6 @@ from anisomesh.meshops.self_intersections import remove_self_intersections
 
 _MAX_HELD = 0.5  # share of the points of a decimation that are corners at most, to hold them
 _MAX_REPAIRS = 50  # faulty triangles up to which a mesh is repaired before it is fitted again
-_NO_EDGES: EdgeEnds = np.zeros((0, 2), dtype=np.int64)
 
 
 def fit_without_faults(
@@ -68,8 +67,8 @@ def _decimated(target: FitTarget, n_points: int) -> FitTask | None:
     held = target.at_corners(surface.points)
     if np.count_nonzero(held) > _MAX_HELD * n_points:
         held[:] = False
-    start = decimate(surface, n_points, held=held).surface
-    return target.task(start, _NO_EDGES) if start.n_points == n_points else None
+    start = decimate(surface, n_points, held=held, crease_edges=target.lines)
+    return target.task(start.surface, start.crease_edges) if start.surface.n_points == n_points else None
 
 
 def _fitted(

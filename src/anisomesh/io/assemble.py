@@ -12,7 +12,7 @@ from anisomesh.io.polygons import PolygonSoup, as_triangles
 from anisomesh.mesh.surface import Surface
 from anisomesh.mesh.topology import edge_keys
 
-_KINDS = "biufcSU"  # of arrays that a mesh can carry
+_CARRIED_KINDS = "biufcSU"  # of dtypes that a mesh can carry
 
 
 def as_mesh(soup: PolygonSoup) -> tuple[Mesh, tuple[str, ...], tuple[str, ...]]:
@@ -67,7 +67,7 @@ def _rows(carried: Carried, data: dict[str, Array], what: str, rows: Integers) -
     for name, values in data.items():
         if not isinstance(name, str) or not name:
             carried.remarks.append(f"left out {what} without a name")
-        elif values.dtype.kind not in _KINDS or values.size == 0:
+        elif values.dtype.kind not in _CARRIED_KINDS or values.size == 0:
             carried.remarks.append(f"left out {what} {name!r} of type {values.dtype} and shape {values.shape}")
         elif len(values) < n_needed:
             carried.remarks.append(f"left out {what} {name!r}: it has {len(values)} rows; expected {n_needed}")

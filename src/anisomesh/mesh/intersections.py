@@ -104,8 +104,8 @@ def _welded(surface: Surface) -> tuple[Points, Faces]:
 
 def _boxes(points: Points, faces: Faces) -> npt.NDArray[np.float64]:
     """Return the bounding boxes (F, 6) of the faces, lower and upper corner."""
-    corners = points[faces]
-    return np.concatenate([corners.min(axis=1), corners.max(axis=1)], axis=1)
+    a, b, c = points[faces[:, 0]], points[faces[:, 1]], points[faces[:, 2]]
+    return np.concatenate([np.minimum(np.minimum(a, b), c), np.maximum(np.maximum(a, b), c)], axis=1)
 
 
 def _slabs(points: Points, faces: Faces) -> npt.NDArray[np.float64]:

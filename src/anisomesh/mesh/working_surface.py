@@ -45,13 +45,14 @@ class WorkingSurface:
         The surface; its first points are the points of ``coarse``, unchanged.
     tagged
         Which of its edges (E',) are parts of tagged edges.
-    coarse
-        The input without short edges; the input itself if it has none.
+    coarse, coarse_tagged
+        The input without short edges, itself if it has none, and which of its edges (E'',) are parts of tagged edges.
     """
 
     surface: Surface
     tagged: EdgeMask
     coarse: Surface
+    coarse_tagged: EdgeMask
     _kept: PointLabels
     _refinement: Refinement
     _trimmed: PointLabels
@@ -106,6 +107,7 @@ def working_surface(surface: Surface, n_vertices: int, *, creases: EdgeMask, tag
         surface=subdivision.surface,
         tagged=edges_within(subdivision, refined, trimmed.marked.labels == _TAGGED),
         coarse=coarsening.surface,
+        coarse_tagged=coarsening.marked.labels == _TAGGED,
         _kept=coarsening.kept,
         _refinement=refinement,
         _trimmed=trimmed.kept,

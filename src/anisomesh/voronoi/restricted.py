@@ -188,7 +188,7 @@ class RestrictedVoronoi:
             if len(problems) == 0:
                 return parts
             self._repair(problems, sites)
-            facets = problems[:, 0]
+            facets = np.ascontiguousarray(problems[:, 0])  # kernels are compiled anew for other memory layouts
         raise RuntimeError(f"{len(problems)} facets could not be clipped, the first: {problems[0].tolist()}")
 
     def _repair(self, problems: Problems, sites: Sites) -> None:

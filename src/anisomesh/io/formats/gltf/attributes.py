@@ -16,7 +16,7 @@ TANGENT = "tangent"
 _OURS = {"TEXCOORD": UV, "COLOR": COLOUR}  # of numbered sets, the first of which has no number
 _SKIN = re.compile(r"(JOINTS|WEIGHTS)_\d+")
 _SET = re.compile(rf"({UV}|{COLOUR})(\d*)")
-_LARGEST_EXACT = 2**24  # up to it every integer has a float32
+_LARGEST_IN_FLOAT32 = 2**24  # up to it every integer has a float32
 
 
 def read_attributes(
@@ -144,7 +144,7 @@ def _custom(name: str, rows: Array) -> Encoded | None:
     if rows.dtype.kind == "b":
         rows = rows.astype(np.uint8)
     elif kind not in COMPONENTS.values() or kind == "u4":  # u4 is for indices only
-        if rows.dtype.kind in "iu" and (rows.min() < -_LARGEST_EXACT or rows.max() > _LARGEST_EXACT):
+        if rows.dtype.kind in "iu" and (rows.min() < -_LARGEST_IN_FLOAT32 or rows.max() > _LARGEST_IN_FLOAT32):
             return None
         rows = rows.astype(np.float32)
     return Encoded("_" + name, rows, False) if np.isfinite(rows).all() else None

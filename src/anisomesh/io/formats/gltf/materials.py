@@ -7,7 +7,7 @@ from typing import Any
 
 from anisomesh.io.formats.gltf.document import Document
 
-_PARTS = ("materials", "textures", "samplers", "images")
+_LISTS = ("materials", "textures", "samplers", "images")
 
 
 def read_materials(document: Document) -> dict[str, Any]:
@@ -20,7 +20,7 @@ def read_materials(document: Document) -> dict[str, Any]:
         with the bytes of images by their number; ``extensionsUsed`` and ``extensionsRequired`` as far as these lists
         name them.
     """
-    kept: dict[str, Any] = {part: document.json[part] for part in _PARTS if part in document.json}
+    kept: dict[str, Any] = {part: document.json[part] for part in _LISTS if part in document.json}
     kept["data"] = {}
     images = []
     for k, image in enumerate(kept.get("images", [])):
@@ -29,7 +29,7 @@ def read_materials(document: Document) -> dict[str, Any]:
         images.append({key: value for key, value in image.items() if key != "bufferView"})
     if images:
         kept["images"] = images
-    text = json.dumps({part: kept[part] for part in _PARTS if part in kept})
+    text = json.dumps({part: kept[part] for part in _LISTS if part in kept})
     for key in ("extensionsUsed", "extensionsRequired"):
         names = [name for name in document.json.get(key, []) if json.dumps(name) in text]
         if names:
@@ -49,7 +49,7 @@ def write_materials(kept: dict[str, Any], document: dict[str, Any], binary: list
     binary
         The content of the views of the document, to which images are added.
     """
-    for key in (*_PARTS, "extensionsUsed", "extensionsRequired"):
+    for key in (*_LISTS, "extensionsUsed", "extensionsRequired"):
         if key in kept:
             document[key] = kept[key]
     images = [dict(image) for image in kept.get("images", [])]

@@ -20,7 +20,7 @@ from anisomesh.io.polygons import Integers, PolygonSoup
 NODE, MATERIAL = "node", "material"
 """Names of the divisions into the nodes of the scene and into materials."""
 
-_TRIANGLES, _STRIP, _FAN = 4, 5, 6  # modes of a primitive; lower ones are points and lines
+TRIANGLES, _STRIP, _FAN = 4, 5, 6  # modes of a primitive; lower ones are points and lines
 _COPIES = "EXT_mesh_gpu_instancing"
 _DEEPEST = 200  # of nodes in nodes
 _MAX_INSTANCES = 100_000
@@ -111,8 +111,8 @@ class _Scene:
 
     def _add_mesh(self, index: int, matrix: npt.NDArray[np.float64], node: int) -> None:
         for primitive in self._json["meshes"][index_of(index)]["primitives"]:
-            mode = primitive.get("mode", _TRIANGLES)
-            if mode < _TRIANGLES:
+            mode = primitive.get("mode", TRIANGLES)
+            if mode < TRIANGLES:
                 self._cells.ignore("line or point")
                 continue
             if mode > _FAN:

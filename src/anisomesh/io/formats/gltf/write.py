@@ -12,12 +12,11 @@ from anisomesh.io.carried import Integers
 from anisomesh.io.formats.gltf.attributes import Encoded, encoded
 from anisomesh.io.formats.gltf.document import BINARY_CHUNK, COMPONENTS, JSON_CHUNK, WIDTHS
 from anisomesh.io.formats.gltf.materials import write_materials
-from anisomesh.io.formats.gltf.read import MATERIAL, NODE
+from anisomesh.io.formats.gltf.read import MATERIAL, NODE, TRIANGLES
 from anisomesh.io.holding import Losses, main_division, name_of
 
 _ALIGNMENT = 4  # bytes
 _ELEMENT_ARRAY, _ARRAY = 34963, 34962  # targets of views
-_TRIANGLES = 4  # mode
 _TYPE_OF = {kind: code for code, kind in COMPONENTS.items()}
 _SHAPE_OF = {width: name for name, width in WIDTHS.items()}
 
@@ -90,7 +89,7 @@ def _primitive(mesh: Mesh, chosen: Integers, writer: _Writer, attributes: list[_
         rows = part.data.rows[vertices.corners if part.at_corners else vertices.points]
         numbers[part.data.name] = writer.add_rows(part.data._replace(rows=rows))
     corners = Encoded("", vertices.triangles.astype("<u4").reshape(-1, 1), False)
-    return {"attributes": numbers, "indices": writer.add_rows(corners, _ELEMENT_ARRAY), "mode": _TRIANGLES}
+    return {"attributes": numbers, "indices": writer.add_rows(corners, _ELEMENT_ARRAY), "mode": TRIANGLES}
 
 
 def _vertices(mesh: Mesh, chosen: Integers) -> _Vertices:

@@ -25,11 +25,10 @@ MODEL_TYPE = "http://schemas.microsoft.com/3dmanufacturing/2013/01/3dmodel"
 CORE = "http://schemas.microsoft.com/3dmanufacturing/core/2015/02"
 MATERIALS = "http://schemas.microsoft.com/3dmanufacturing/material/2015/02"
 _SHAPES = {"beamlattice", "booleanshape", "levelset"}
-_NOT_KEPT = {"texture2d", "compositematerials", "multiproperties"}
+_LEFT_OUT = {"texture2d", "compositematerials", "multiproperties"}
 _DEEPEST_COMPONENTS = 100
 _MAX_OBJECTS = 100_000
 _LARGEST_SHARE = 1_100  # uncompressed bytes per byte of an entry; zlib reaches 1,032
-_DATE = (1980, 1, 1, 0, 0, 0)  # of all entries, so that the same mesh gives the same file
 
 
 @dataclass
@@ -164,7 +163,7 @@ def _parse_model(text: bytes, name: str) -> _Model:
                 model.colours[group] = []
             elif local == "color" and group in model.colours:
                 model.colours[group].append(attributes.get("color", ""))
-            elif local in _NOT_KEPT:
+            elif local in _LEFT_OUT:
                 model.ignored.add(local)
         elif namespace != CORE:
             if local in _SHAPES:

@@ -1,0 +1,39 @@
+"""Compile nearly all kernels, in two parts that take about as long: ``compile_kernels.py first`` and ``second``."""
+
+import sys
+
+import numpy as np
+
+import anisomesh
+from anisomesh.fitting.arrays import FitTask
+from anisomesh.fitting.fit import FitOptions, fit_mesh
+from anisomesh.fitting.samples import sample_surface
+from anisomesh.learn.inference.predict import predict
+from anisomesh.mesh.closest_points import ClosestPoints
+from anisomesh.meshops.decimation import decimate
+from anisomesh.metric.field import MetricField
+from anisomesh.metric.transfer import PlacedMetric
+from anisomesh.shapes.analytic import box, sphere
+
+
+def first():
+    """Run the stages of a remesh but the last."""
+    for shape in (sphere(3), box((9.0, 1.0, 1.0), n=1)):
+        anisomesh.remesh(shape, n_vertices=300, embedding="direct", fit=False)
+
+
+def second():
+    """Run the measures, the network, the decimation and the fit."""
+    ball = sphere(3)
+    anisomesh.evaluate(ball, ball, samples=100)
+    predict(ball.with_points(ball.points / ball.diagonal))
+    coarse = decimate(ball, 100).surface
+    identity = PlacedMetric(ClosestPoints(ball), MetricField(tensors=np.tile(np.eye(3), (ball.n_points, 1, 1))))
+    none = np.zeros(len(ball.edges), dtype=bool)
+    samples = sample_surface(ball, 2_000, creases=none, metric=identity, rng=np.random.default_rng(0))
+    held, kept = np.zeros(coarse.n_points, dtype=bool), np.zeros(len(coarse.edges), dtype=bool)
+    fit_mesh(FitTask(mesh=coarse, held=held, kept=kept, crease_angle=40.0), samples, FitOptions())
+
+
+if __name__ == "__main__":
+    {"first": first, "second": second}[sys.argv[1]]()
