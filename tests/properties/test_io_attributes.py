@@ -72,7 +72,7 @@ FULL = {
     ".3mf": (),
     ".off": (),
 }
-NAME = st.text(st.characters(min_codepoint=33, max_codepoint=0x24F, exclude_characters='"#\x7f'), min_size=1).filter(
+NAME = st.text(st.characters(min_codepoint=33, max_codepoint=0x24F, exclude_characters='"\x7f'), min_size=1).filter(
     lambda text: text.strip() == text and text.isprintable()
 )
 

@@ -2,12 +2,15 @@
 
 import json
 import struct
+import time
 import zipfile
 
 import numpy as np
 import pytest
 
-from anisomesh.io.meshes import load, load_mesh
+from anisomesh.attributes.model import Mesh, Regions
+from anisomesh.io.meshes import MESH_FORMATS, load, load_mesh, save
+from anisomesh.shapes import analytic as shapes
 
 TRIANGLES = "3 0 1 2\n3 1 3 2\n"
 POINTS = "0 0 0\n1 0 0\n0 1 0\n1 1 0\n"
@@ -29,14 +32,14 @@ def test_obj(tmp_path, caplog):
     text = (
         "mtllib none.mtl\nv 0 0 0 1 0 0\nv 1 0 0 0 1 0\nv 0 1 0 0 0 1\nv 1 1 0 1 1 1\n"
         "vt 0 0 0\nvt 1 0 0\nvt 0 1 0\nvn 0 0 1\nf 1/1/1 2/2/1 3/3/-1\n"
-        "o thing # with a remark\ng left part\nusemtl dark wood\ns 2\nvt .5 .5\nf 2/-3 4/-1 3/-2\ns off\nl 1 2 4\np 3\n"
+        "o thing #25\ng left part\nusemtl dark wood\ns 2\nvt .5 .5\nf 2/-3 4/-1 3/-2\ns off\nl 1 2 4\np 3\n"
     )
     mesh = read(tmp_path, "a.obj", text)
     np.testing.assert_array_equal(mesh.point_data["color"], [[1, 0, 0], [0, 1, 0], [0, 0, 1], [1, 1, 1]])
     uv = [[[0, 0], [1, 0], [0, 1]], [[1, 0], [0.5, 0.5], [0, 1]]]
     np.testing.assert_array_equal(mesh.corner_data["uv"], uv)
     np.testing.assert_array_equal(mesh.corner_data["normal"], [[[0, 0, 1]] * 3, [[0, 0, 0]] * 3])
-    for division, name in (("object", "thing"), ("group", "left part"), ("material", "dark wood")):
+    for division, name in (("object", "thing #25"), ("group", "left part"), ("material", "dark wood")):
         assert mesh.regions[division].labels.tolist() == [0, 1]
         assert mesh.regions[division].names == {1: name}
     assert mesh.face_data["smoothing_group"].tolist() == [0, 2]
@@ -240,6 +243,48 @@ def test_pieces_of_vtu(tmp_path, caplog):
     assert mesh.face_data["number"].tolist() == [1, 2]
     assert rows(mesh.features) == {(0, 1), (3, 4)}
     assert "left out PointData 'b', which 1 of 2 pieces lack" in caplog.text
+
+
+def test_numbers_of_faces_are_no_regions(tmp_path):
+    """Regression: every edge of a mesh whose faces have numbers was a border between regions."""
+    surface = shapes.box(n=3)
+    numbers = np.arange(surface.n_faces)
+    save(Mesh(surface=surface, face_data={"face_id": numbers, "part_id": numbers % 5}), tmp_path / "a.vtu")
+    mesh = load_mesh(tmp_path / "a.vtu")
+    assert set(mesh.regions) == {"part_id"}
+    np.testing.assert_array_equal(mesh.face_data["face_id"], numbers)
+
+
+def test_data_of_vtu_that_cannot_be_unpacked(tmp_path, caplog):
+    surface = shapes.box(n=3)
+    save(Mesh(surface=surface, point_data={"a": surface.points[:, 0], "b": surface.points[:, 1]}), tmp_path / "a.vtu")
+    lines = (tmp_path / "a.vtu").read_text().splitlines()
+    place = next(k for k, line in enumerate(lines) if 'Name="a"' in line) + 1
+    lines[place] = lines[place][:60] + "AAAAAAAA" + lines[place][68:]
+    (tmp_path / "a.vtu").write_text("\n".join(lines))
+    mesh = load_mesh(tmp_path / "a.vtu")
+    assert set(mesh.point_data) == {"b"}
+    assert "left out PointData 'a': error: Error -3" in caplog.text
+
+
+@pytest.mark.parametrize("suffix", [".glb", ".3mf", ".stl", ".obj"])
+def test_thousands_of_regions_take_no_time(tmp_path, suffix):
+    """Regression: the time was the product of the numbers of regions and faces."""
+    surface = shapes.torus(n_major=100, n_minor=50)
+    labels = np.arange(surface.n_faces) // 4
+    start = time.process_time()
+    save(Mesh(surface=surface, regions={"object": Regions(labels)}), tmp_path / f"a{suffix}")
+    assert len(np.unique(load_mesh(tmp_path / f"a{suffix}").regions.popitem()[1].labels)) == 2_500
+    assert time.process_time() - start < 4.0
+
+
+def test_materials_of_a_user_that_no_format_knows(tmp_path, caplog):
+    materials = {"obj": 3, "gltf": "red", "display_colours": None, "texture_files": 5, "unit": [], "field_data": 1}
+    mesh = Mesh(surface=shapes.box(n=1), regions={"material": Regions(np.arange(12) % 2)}, materials=materials)
+    for suffix in MESH_FORMATS:
+        save(mesh, tmp_path / f"a{suffix}")
+        assert load(tmp_path / f"a{suffix}").n_faces == 12
+    assert "materials 'obj'" in caplog.text
 
 
 def glb(document, *arrays):

@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import lzma
 import re
+import zlib
 from collections.abc import Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass, field
@@ -17,7 +19,11 @@ Integers = npt.NDArray[np.int64]
 UV, NORMAL, COLOUR = "uv", "normal", "color"
 """Names of texture coordinates, unit normals and colours, whatever a format calls them."""
 
-_BROKEN = (ValueError, KeyError, IndexError, TypeError, AttributeError, OverflowError, RecursionError)
+_BROKEN = (
+    *(ValueError, KeyError, IndexError, TypeError, AttributeError, OverflowError, RecursionError),
+    *(zlib.error, lzma.LZMAError),
+)
+_FEW_REGIONS, _FACES_PER_REGION = 8, 2  # of integers that are regions by their name: more have so many faces; heuristic
 _REGION = re.compile(
     r"(gmsh:)?(physical|geometrical)|medit:ref|reference|(domain|part|zone|block|region|material|group|object|solid)s?"
     r"|(cell_?entity|model_?face|domain|part|zone|block|region|material|group|object|face|boundary)_?(ids?|tags?|labels?)",
@@ -74,7 +80,9 @@ class Carried:
     def add_cell_data(self, name: str, values: Array, *, names: dict[int, str] | None = None) -> None:
         """Add cell data: a division if its labels have names or it is called as divisions usually are."""
         is_label = values.ndim == 1 and values.dtype.kind in "iu"
-        if is_label and (names is not None or is_region(name)):
+        most = max(_FEW_REGIONS, len(values) // _FACES_PER_REGION)
+        by_name = is_label and is_region(name) and len(np.unique(values)) <= most
+        if is_label and (names is not None or by_name):
             self.divisions[name] = Division(labels=values.astype(np.int64), names=names or {})
         else:
             self.cell_data[name] = values

@@ -66,10 +66,19 @@ def flat_rows(values: Array) -> Array:
     return values if values.ndim == 1 else values.reshape(len(values), -1)
 
 
-def main_division(mesh: Mesh, *preferred: str) -> tuple[str, Regions] | None:
+def main_division(regions: Mapping[str, Regions], *preferred: str) -> tuple[str, Regions] | None:
     """Return the division for a format that holds one: one of these names, else the most telling one."""
-    wanted: Sequence[str] = (*preferred, *_PREFERRED, *sorted(mesh.regions))
-    return next(((name, mesh.regions[name]) for name in wanted if name in mesh.regions), None)
+    wanted = (*preferred, *_PREFERRED, *sorted(regions))
+    return next(((name, regions[name]) for name in wanted if name in regions), None)
+
+
+def by_label(*labels: Integers) -> list[tuple[tuple[int, ...], Integers]]:
+    """Return the faces (n,) with each combination of labels (F,), in the order of the labels."""
+    order = np.lexsort(labels[::-1])
+    table = np.stack(labels, axis=1)[order]
+    begin = np.flatnonzero((np.diff(table, axis=0, prepend=table[:1] - 1) != 0).any(axis=1))
+    keys = [tuple(row) for row in table[begin].tolist()]
+    return list(zip(keys, np.split(order.astype(np.int64), begin[1:]), strict=True))
 
 
 def continuous_corner_data(mesh: Mesh, losses: Losses) -> dict[str, Array]:

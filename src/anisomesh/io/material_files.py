@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import os
 import re
+from collections.abc import Mapping
 from dataclasses import replace
 from pathlib import Path
 
@@ -63,7 +64,8 @@ def write_beside(content: bytes, mesh: Mesh, path: Path | None, losses: Losses) 
     stem of the OBJ file, and textures are named by paths relative to it; they are not copied.
     """
     given = mesh.materials.get("obj")
-    if given is None:
+    if not isinstance(given, Mapping) or LIBRARIES not in given:
+        losses.add("materials", *(["obj"] if "obj" in mesh.materials else []))
         return content
     libraries = given[LIBRARIES]
     if "text" not in given or path is None:

@@ -11,7 +11,7 @@ from anisomesh._arrays import Points
 from anisomesh.attributes.model import Mesh, Regions
 from anisomesh.io.carried import Carried
 from anisomesh.io.formats.words import BYTE_ORDER_MARK, format_rows
-from anisomesh.io.holding import Losses, main_division, name_of
+from anisomesh.io.holding import Losses, by_label, main_division, name_of
 from anisomesh.io.polygons import PolygonSoup
 from anisomesh.mesh.geometry import face_cross, unit
 from anisomesh.mesh.weld import coincident
@@ -99,7 +99,7 @@ def stl_bytes(mesh: Mesh, losses: Losses) -> bytes:
     becomes a binary file, in float32.
     """
     points, faces = mesh.surface.points, mesh.surface.faces
-    found = main_division(mesh, SOLID)
+    found = main_division(mesh.regions, SOLID)
     attribute = mesh.face_data.get(ATTRIBUTE)
     is_held = found is None and attribute is not None and attribute.ndim == 1 and attribute.dtype == np.uint16
     losses.add("point data", *mesh.point_data)
@@ -126,8 +126,8 @@ def _text(mesh: Mesh, solids: Regions) -> str:
     points, faces = mesh.surface.points, mesh.surface.faces
     table = np.concatenate([unit(face_cross(points, faces)), points[faces].reshape(-1, 9)], axis=1)
     parts = []
-    for label in np.unique(solids.labels).tolist():
+    for (label,), chosen in by_label(solids.labels):
         name = name_of(solids, label)
-        rows = format_rows(_FACET_LINES, table[solids.labels == label])
+        rows = format_rows(_FACET_LINES, table[chosen])
         parts.append(f"solid {name}\n{rows}endsolid {name}\n")
     return "".join(parts)

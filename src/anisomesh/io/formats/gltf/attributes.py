@@ -76,7 +76,7 @@ class Attributes:
                 carried.remarks.append(f"left out {name!r}, which some of its meshes lack")
                 continue
             with carried.optional(f"the attribute {name!r}"):
-                is_colour = name.startswith(COLOUR)
+                is_colour = bool(_SET.fullmatch(name)) and name.startswith(COLOUR)
                 data[name] = _colours(name, self._parts, given) if is_colour else self._filled(name, given[0])
             if lacks:
                 filled.append(name)

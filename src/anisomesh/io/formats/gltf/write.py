@@ -13,7 +13,7 @@ from anisomesh.io.formats.gltf.attributes import Encoded, encoded
 from anisomesh.io.formats.gltf.document import BINARY_CHUNK, COMPONENTS, JSON_CHUNK, WIDTHS
 from anisomesh.io.formats.gltf.materials import write_materials
 from anisomesh.io.formats.gltf.read import MATERIAL, NODE, TRIANGLES
-from anisomesh.io.holding import Losses, main_division, name_of
+from anisomesh.io.holding import Losses, by_label, main_division, name_of
 
 _ALIGNMENT = 4  # bytes
 _ELEMENT_ARRAY, _ARRAY = 34963, 34962  # targets of views
@@ -52,18 +52,20 @@ def glb_bytes(mesh: Mesh, losses: Losses) -> bytes:
     losses.features(mesh)
     writer, attributes = _Writer(), _attributes(mesh, losses)
     given = mesh.materials.get("gltf")
-    count = len(given.get("materials", [])) if given else 0
+    given = given if isinstance(given, dict) else {}
+    count = len(given.get("materials", []))
     labels = [np.zeros(mesh.surface.n_faces, dtype=np.int64) if d is None else d.labels for d in (nodes, materials)]
-    for node in np.unique(labels[0]).tolist():
-        primitives = []
-        for material in np.unique(labels[1][labels[0] == node]).tolist():
-            chosen = np.flatnonzero((labels[0] == node) & (labels[1] == material))
-            primitive = _primitive(mesh, chosen, writer, attributes)
-            number = material if given else (names.index(material) if material in names else -1)
-            if materials is not None and (0 <= number < count or (not given and number >= 0)):
-                primitive["material"] = number
-            primitives.append(primitive)
-        writer.add_node(primitives, "" if nodes is None else name_of(nodes, node))
+    numbers = {label: k for k, label in enumerate(names)}
+    if given:
+        numbers = {label: label for label in names if label < count}
+    primitives: dict[int, list[dict[str, Any]]] = {}
+    for (node, material), chosen in by_label(*labels):
+        primitive = _primitive(mesh, np.sort(chosen), writer, attributes)
+        if material in numbers:
+            primitive["material"] = numbers[material]
+        primitives.setdefault(node, []).append(primitive)
+    for node, parts in primitives.items():
+        writer.add_node(parts, "" if nodes is None else name_of(nodes, node))
     if given:
         write_materials(given, writer.document, writer.binary)
     elif materials is not None and names:
@@ -74,7 +76,7 @@ def glb_bytes(mesh: Mesh, losses: Losses) -> bytes:
 def _divisions(mesh: Mesh, losses: Losses) -> tuple[Regions | None, Regions | None, list[int]]:
     """Return the divisions into nodes and into materials, and the labels of the latter that are materials."""
     others = {name: regions for name, regions in mesh.regions.items() if name != MATERIAL}
-    found = main_division(Mesh(surface=mesh.surface, regions=others), NODE)
+    found = main_division(others, NODE)
     losses.add("regions", *(name for name in others if found is None or name != found[0]))
     materials = mesh.regions.get(MATERIAL)
     labels = [] if materials is None else [label for label in np.unique(materials.labels).tolist() if label >= 0]

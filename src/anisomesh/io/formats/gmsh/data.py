@@ -61,7 +61,7 @@ def read_entities(data: bytes, numbers: NumberStream, carried: Carried, *, is_40
                     if dimension > 0:
                         _tags(stream)
                     if groups:
-                        entities[dimension, tag] = groups[0]
+                        entities[dimension, tag] = abs(groups[0])  # negative: turned
                     n_several += dimension == _SURFACE and len(groups) > 1
     if n_several:
         carried.remarks.append(f"{n_several} surface(s) are in several physical groups and kept in the first only")

@@ -55,7 +55,7 @@ def _divisions(mesh: Mesh, losses: Losses) -> tuple[Regions | None, Integers, di
         else:
             usable[name] = regions
     entities = usable.pop("geometrical", None)
-    found = main_division(Mesh(surface=mesh.surface, regions=usable), "physical")
+    found = main_division(usable, "physical")
     physical = None if found is None else usable.pop(found[0])
     if entities is not None:
         geometrical = entities.labels

@@ -21,7 +21,7 @@ def medit_bytes(mesh: Mesh, losses: Losses) -> bytes:
     """
     points, faces = mesh.surface.points, mesh.surface.faces
     vertices = np.zeros(len(points), dtype=np.int64)
-    found = main_division(mesh, REFERENCE)
+    found = main_division(mesh.regions, REFERENCE)
     losses.add("regions", *(name for name in mesh.regions if found is None or name != found[0]))
     if found is not None:
         losses.names_of_regions(mesh, found[0])

@@ -81,7 +81,7 @@ def _states(mesh: Mesh, losses: Losses) -> list[tuple[str, Integers, dict[int, s
     regions = dict(mesh.regions)
     found = {name: regions.pop(name) for name in DIVISIONS if name in regions}
     for slot in _FREE:
-        other = main_division(Mesh(surface=mesh.surface, regions=regions))
+        other = main_division(regions)
         if slot not in found and other is not None:
             found[slot] = regions.pop(other[0])
     losses.add("regions", *regions)

@@ -40,6 +40,7 @@ def ply_bytes(mesh: Mesh, losses: Losses) -> bytes:
     _add_columns(face, numeric(mesh.face_data, "face data", losses), "face data", losses)
     lists = _corner_lists(face, numeric(mesh.corner_data, "corner data", losses), losses)
     textures = mesh.materials.get("texture_files", ())
+    textures = textures if isinstance(textures, tuple | list) else ()
     comments = [f"{TEXTURE_FILE} {_line(name)}" for name in textures]
     losses.add("materials", *(name for name in mesh.materials if name != "texture_files"))
     if len(mesh.fixed_points):

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import io
 import zipfile
+from collections.abc import Mapping
 from typing import Any
 from xml.sax.saxutils import quoteattr
 
@@ -14,7 +15,7 @@ from anisomesh.io.carried import COLOUR, Array, Integers
 from anisomesh.io.formats.threemf.properties import MATERIAL, OBJECT
 from anisomesh.io.formats.threemf.read import CORE, MATERIALS, MODEL_TYPE, ROOT
 from anisomesh.io.formats.words import format_rows
-from anisomesh.io.holding import Losses, main_division, name_of
+from anisomesh.io.holding import Losses, by_label, main_division, name_of
 
 _DATE = (1980, 1, 1, 0, 0, 0)  # of all entries, so that the same mesh gives the same file
 _GREY = "#808080FF"
@@ -32,7 +33,7 @@ def threemf_bytes(mesh: Mesh, losses: Losses) -> bytes:
     kept. Regions keep their names, not their numbers.
     """
     others = {name: regions for name, regions in mesh.regions.items() if name != MATERIAL}
-    found = main_division(Mesh(surface=mesh.surface, regions=others), OBJECT)
+    found = main_division(others, OBJECT)
     resources, properties = _properties(mesh, losses)
     losses.add("regions", *(name for name in others if found is None or name != found[0]))
     losses.add("face data", *mesh.face_data)
@@ -71,7 +72,8 @@ def _properties(mesh: Mesh, losses: Losses) -> tuple[str, Array]:
 
 def _materials(mesh: Mesh, materials: Regions) -> tuple[str, Array]:
     """Return the group of base materials and the attributes of triangles; label 0 without a name is no material."""
-    displayed = mesh.materials.get("display_colours", {})
+    given = mesh.materials.get("display_colours")
+    displayed = given if isinstance(given, Mapping) else {}
     labels = [label for label in np.unique(materials.labels).tolist() if label > 0 or label in materials.names]
     entries = []
     for label in labels:
@@ -103,8 +105,7 @@ def _objects(mesh: Mesh, division: Regions | None, properties: Array) -> list[st
     if division is None:
         return [_object(_FIRST_OBJECT, "", points, faces, properties)]
     objects = []
-    for k, label in enumerate(np.unique(division.labels).tolist()):
-        chosen = division.labels == label
+    for k, ((label,), chosen) in enumerate(by_label(division.labels)):
         used, corners = np.unique(faces[chosen], return_inverse=True)
         name = name_of(division, label)
         objects.append(_object(_FIRST_OBJECT + k, name, points[used], corners.reshape(-1, 3), properties[chosen]))

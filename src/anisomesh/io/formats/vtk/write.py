@@ -158,6 +158,12 @@ def _section(name: str, arrays: Data) -> str:
             tag, kind, numbers = "Array", "String", string_codes(values)
         head = f'<{tag} type="{kind or type_name(values)}" Name={quoteattr(key)} format="binary"{count}>'
         lines.append(f"{head}\n{packed_array(numbers)}\n</{tag}>")
-    meanings = [(UV, "TCoords"), (NORMAL, "Normals")] if name == "PointData" else []
-    known = "".join(f' {attribute}="{ours}"' for ours, attribute in meanings if ours in arrays)
+    meanings = [(UV, "TCoords", (2, 3)), (NORMAL, "Normals", (3,))] if name == "PointData" else []
+    found = [(ours, attribute) for ours, attribute, widths in meanings if _width(arrays.get(ours)) in widths]
+    known = "".join(f' {attribute}="{ours}"' for ours, attribute in found)
     return "\n".join([f"<{name}{known}>", *lines, f"</{name}>"])
+
+
+def _width(values: Array | None) -> int:
+    """Return the number of components of numbers, 0 for none."""
+    return 0 if values is None or values.ndim < 2 or values.dtype.kind not in "iuf" else int(values.shape[1])
