@@ -20,9 +20,15 @@ UV, NORMAL, COLOUR = "uv", "normal", "color"
 """Names of texture coordinates, unit normals and colours, whatever a format calls them."""
 
 _BROKEN = (
-    *(ValueError, KeyError, IndexError, TypeError, AttributeError, OverflowError, RecursionError),
-    *(zlib.error, lzma.LZMAError),
-)
+    ValueError,
+    LookupError,
+    TypeError,
+    AttributeError,
+    OverflowError,
+    RecursionError,
+    zlib.error,
+    lzma.LZMAError,
+)  # what malformed data make readers raise
 _FEW_REGIONS, _FACES_PER_REGION = 8, 2  # of integers that are regions by their name: more have so many faces; heuristic
 _REGION = re.compile(
     r"(gmsh:)?(physical|geometrical)|medit:ref|reference|(domain|part|zone|block|region|material|group|object|solid)s?"

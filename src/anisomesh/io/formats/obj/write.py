@@ -35,11 +35,10 @@ def obj_bytes(mesh: Mesh, losses: Losses) -> bytes:
     lines.append(_faces(columns, states, len(faces)))
     lines.append(format_rows("l %d %d\n", mesh.features + 1))
     lines.append(format_rows("p %d\n", mesh.fixed_points + 1))
-    held = {name for name, numbers in zip((UV, NORMAL), columns[1:], strict=True) if numbers is not None}
-    is_held = COLOUR in mesh.point_data and _colours(mesh) is not None
-    held |= {COLOUR} if is_held else set()
+    held = [name for name, numbers in zip((UV, NORMAL), columns[1:], strict=True) if numbers is not None]
+    losses.add("corner data", *(name for name in mesh.corner_data if name not in held))
+    held += [] if _colours(mesh) is None else [COLOUR]
     losses.add("point data", *(name for name in mesh.point_data if name not in held))
-    losses.add("corner data", *(name for name in mesh.corner_data if name not in held - {COLOUR}))
     losses.add("materials", *(name for name in mesh.materials if name != "obj"))
     return "".join(lines).encode("utf-8", errors="replace")
 
@@ -91,10 +90,11 @@ def _states(mesh: Mesh, losses: Losses) -> list[tuple[str, Integers, dict[int, s
         if name in found
     ]
     smoothing = mesh.face_data.get(SMOOTHING)
-    if smoothing is not None and smoothing.ndim == 1 and smoothing.dtype.kind in "iu":
+    is_held = smoothing is not None and smoothing.ndim == 1 and smoothing.dtype.kind in "iu"
+    losses.add("face data", *(name for name in mesh.face_data if name != SMOOTHING or not is_held))
+    if smoothing is not None and is_held:
         labels = smoothing.astype(np.int64)
         states.append(("s", labels, {label: str(label) if label else "off" for label in np.unique(labels).tolist()}))
-    losses.add("face data", *(name for name in mesh.face_data if name != SMOOTHING or states[-1:][0][0] != "s"))
     return states
 
 
