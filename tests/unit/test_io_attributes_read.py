@@ -4,6 +4,7 @@ import json
 import struct
 import time
 import zipfile
+from urllib.parse import unquote
 
 import numpy as np
 import pytest
@@ -285,6 +286,31 @@ def test_materials_of_a_user_that_no_format_knows(tmp_path, caplog):
         save(mesh, tmp_path / f"a{suffix}")
         assert load(tmp_path / f"a{suffix}").n_faces == 12
     assert "materials 'obj'" in caplog.text
+
+
+@pytest.mark.parametrize("suffix", [".ply", ".glb"])
+def test_textures_in_other_files_are_named_from_the_output(tmp_path, suffix):
+    source, target = tmp_path / "in put", tmp_path / "out" / "deeper"
+    source.mkdir()
+    target.mkdir(parents=True)
+    (source / "my wood.png").write_bytes(b"pixels")
+    names = ("my wood.png", "missing.png")
+    materials = {"texture_files": names}
+    if suffix == ".glb":
+        images = [{"uri": "my%20wood.png"}, {"uri": "missing.png"}, {"uri": "data:,x"}]
+        materials = {"gltf": {"materials": [{"name": "wood"}], "images": images}}
+    regions = {"material": Regions(np.zeros(12, dtype=int))}
+    save(Mesh(surface=shapes.box(n=1), regions=regions, materials=materials), source / f"a{suffix}")
+    save(load_mesh(source / f"a{suffix}"), target / f"b{suffix}")
+    content = (target / f"b{suffix}").read_bytes()
+    assert (b"in%20put/my%20wood.png" if suffix == ".glb" else b"TextureFile ../../in put/my wood.png\n") in content
+    again = load_mesh(target / f"b{suffix}").materials
+    found = again["gltf"]["images"] if suffix == ".glb" else again["texture_files"]
+    expected = [str(source / "my wood.png"), "missing.png"]
+    if suffix == ".glb":
+        assert [unquote(image["uri"]) for image in found] == [*expected, "data:,x"]
+    else:
+        assert list(found) == expected
 
 
 def glb(document, *arrays):

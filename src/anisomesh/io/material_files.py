@@ -1,12 +1,14 @@
-"""The material files (.mtl) beside OBJ files."""
+"""Files beside mesh files: materials of OBJ (.mtl), and textures."""
 
 from __future__ import annotations
 
 import os
 import re
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import replace
 from pathlib import Path
+from typing import Any
+from urllib.parse import quote, unquote
 
 from anisomesh.attributes.model import Mesh
 from anisomesh.io.atomic import atomic_path
@@ -19,10 +21,11 @@ _TEXTURE = re.compile(r"\s*(?:map_\w+|bump|disp|decal|refl|norm)\s", re.IGNORECA
 
 def read_beside(mesh: Mesh, path: Path) -> tuple[Mesh, tuple[str, ...]]:
     """Return a mesh with the text and the folder of its material files, and what is missing, a line each."""
+    folder = folder_of(path)
+    mesh = with_texture_names(mesh, lambda name: absolute_name(name, folder))
     given = mesh.materials.get("obj")
     if given is None:
         return mesh, ()
-    folder = path.resolve().parent
     texts, losses = [], []
     for name in _names(given[LIBRARIES], folder):
         file = folder / name
@@ -34,6 +37,47 @@ def read_beside(mesh: Mesh, path: Path) -> tuple[Mesh, tuple[str, ...]]:
             losses.append(f"left out the materials of {name!r}: {getattr(error, 'strerror', None) or error}")
     found = {**given, "text": "\n".join(texts), "folder": str(folder)} if texts else given
     return replace(mesh, materials={**mesh.materials, "obj": found}), tuple(losses)
+
+
+def folder_of(path: str | os.PathLike[str]) -> Path:
+    """Return the folder of a file, without links."""
+    return Path(os.path.realpath(Path(path).parent))
+
+
+def with_texture_names(mesh: Mesh, rename: Callable[[str], str]) -> Mesh:
+    """Return a mesh with other names of the textures that comments of PLY and images of GLB name."""
+    materials = dict(mesh.materials)
+    names, gltf = materials.get("texture_files"), materials.get("gltf")
+    if isinstance(names, tuple | list):
+        materials["texture_files"] = tuple(rename(str(name)) for name in names)
+    if isinstance(gltf, Mapping) and any(_is_file(image) for image in gltf.get("images", ())):
+        images = [
+            {**image, "uri": quote(rename(unquote(image["uri"])))} if _is_file(image) else image
+            for image in gltf["images"]
+        ]
+        materials["gltf"] = {**gltf, "images": images}
+    return replace(mesh, materials=materials)
+
+
+def _is_file(image: Mapping[str, Any]) -> bool:
+    """Return whether an image is in a file, not in a view or in the text itself."""
+    return isinstance(image.get("uri"), str) and not re.match(r"[a-zA-Z][a-zA-Z+.-]+:", image["uri"])
+
+
+def absolute_name(name: str, folder: Path) -> str:
+    """Return the absolute name of a file that a name refers to in a folder; the same name if there is none."""
+    try:
+        return str((folder / name).resolve()) if (folder / name).is_file() else name
+    except (OSError, ValueError):  # too long, or not a name
+        return name
+
+
+def relative_name(name: str, folder: Path) -> str:
+    """Return the name from a folder of a file with an absolute name; the same name for others."""
+    try:
+        return os.path.relpath(name, folder).replace(os.sep, "/") if Path(name).is_absolute() else name
+    except ValueError:  # on another drive
+        return name
 
 
 def _names(libraries: tuple[str, ...], folder: Path) -> list[str]:
@@ -71,8 +115,7 @@ def write_beside(content: bytes, mesh: Mesh, path: Path | None, losses: Losses) 
     if "text" not in given or path is None:
         if "text" in given:
             losses.say("the content of material files, since a stream has no folder; it only names them")
-    elif str(path.resolve().parent) != given["folder"]:
-        folder = path.resolve().parent
+    elif str(folder := folder_of(path)) != given["folder"]:
         target = _free_name(folder, path.stem)
         text = _MARK + _moved(given["text"], Path(given["folder"]), folder)
         with atomic_path(target) as temporary:
@@ -98,11 +141,7 @@ def _moved(text: str, old: Path, new: Path) -> str:
     for line in text.splitlines():
         place = _texture_name(line, old) if _TEXTURE.match(line) else None
         if place is not None:
-            try:
-                name = os.path.relpath(old / line[place:].strip(), new)
-            except ValueError:  # on another drive
-                name = str(old / line[place:].strip())
-            line = line[:place] + name.replace(os.sep, "/")
+            line = line[:place] + relative_name(str(old / line[place:].strip()), new)
         lines.append(line)
     return "\n".join([*lines, ""])
 

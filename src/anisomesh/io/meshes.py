@@ -224,6 +224,8 @@ def save(
     suffix = _known_suffix(name, file_format)
     if point_data:
         mesh = _with_point_data(mesh, name, point_data)
+    folder = Path.cwd() if stream is not None else material_files.folder_of(name)
+    mesh = material_files.with_texture_names(mesh, lambda name: material_files.relative_name(name, folder))
     losses = Losses()
     try:
         content = _WRITERS[suffix](mesh, losses)
