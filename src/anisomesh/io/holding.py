@@ -12,6 +12,9 @@ from anisomesh.io.carried import Array, Integers
 _PREFERRED = ("physical", "material", "group", "object", "solid", "node", "reference")  # divisions, if one is kept
 
 
+_LARGEST_EXACT = 2**53  # up to it every integer has a float64
+
+
 class Losses:
     """Collects what a format cannot hold, for one warning."""
 
@@ -59,6 +62,13 @@ def numeric(data: Mapping[str, Array], what: str, losses: Losses) -> dict[str, A
         else:
             kept[name] = values
     return kept
+
+
+def is_exact_in_float64(values: Array) -> bool:
+    """Return whether float64 holds numbers exactly: all but large integers of 64 bits."""
+    if values.dtype.kind not in "iu" or values.dtype.itemsize < 8:
+        return True
+    return max(-int(values.min()), int(values.max())) <= _LARGEST_EXACT
 
 
 def flat_rows(values: Array) -> Array:

@@ -115,9 +115,9 @@ def write_beside(content: bytes, mesh: Mesh, path: Path | None, losses: Losses) 
     if "text" not in given or path is None:
         if "text" in given:
             losses.say("the content of material files, since a stream has no folder; it only names them")
-    elif str(folder := folder_of(path)) != given["folder"]:
+    elif str(folder := folder_of(path)) != given.get("folder", ""):
         target = _free_name(folder, path.stem)
-        text = _MARK + _moved(given["text"], Path(given["folder"]), folder)
+        text = _MARK + _moved(given["text"], Path(given.get("folder", "")), folder)
         with atomic_path(target) as temporary:
             temporary.write_text(text, encoding="utf-8", errors="surrogateescape", newline="")
         libraries = (target.name,)

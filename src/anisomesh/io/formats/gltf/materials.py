@@ -53,8 +53,8 @@ def write_materials(kept: dict[str, Any], document: dict[str, Any], binary: list
         if key in kept:
             document[key] = kept[key]
     images = [dict(image) for image in kept.get("images", [])]
-    for k, data in kept.get("data", {}).items():
-        images[k]["bufferView"] = len(binary)
+    for image, data in ((images[k], data) for k, data in kept.get("data", {}).items() if k < len(images)):
+        image["bufferView"] = len(binary)
         binary.append(data)
     if images:
         document["images"] = images

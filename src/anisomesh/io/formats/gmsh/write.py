@@ -2,12 +2,22 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
+
 import numpy as np
 
 from anisomesh.attributes.model import Mesh, Regions
 from anisomesh.io.carried import Array, Integers, separate_columns
 from anisomesh.io.formats.gmsh.elements import LINE, POINT, TRIANGLE, entities_of
-from anisomesh.io.holding import Losses, continuous_corner_data, flat_rows, main_division, name_of, numeric
+from anisomesh.io.holding import (
+    Losses,
+    continuous_corner_data,
+    flat_rows,
+    is_exact_in_float64,
+    main_division,
+    name_of,
+    numeric,
+)
 
 _WIDTHS = (1, 3, 9)  # numbers of components that Gmsh knows
 
@@ -39,10 +49,17 @@ def msh_bytes(mesh: Mesh, losses: Losses) -> bytes:
             _physical_names(physical),
             b"$Nodes\n%d\n" % len(points) + nodes.tobytes() + b"\n$EndNodes\n",
             b"$Elements\n%d\n" % (len(faces) + n_others) + b"".join(parts) + b"\n$EndElements\n",
-            *_data("NodeData", numeric(point_data, "point data", losses), 0),
-            *_data("ElementData", {**numeric(mesh.face_data, "face data", losses), **others}, n_others),
+            *_data("NodeData", _exact(point_data, "point data", losses), 0),
+            *_data("ElementData", {**_exact(mesh.face_data, "face data", losses), **others}, n_others),
         ]
     )
+
+
+def _exact(data: Mapping[str, Array], what: str, losses: Losses) -> dict[str, Array]:
+    """Return the arrays of numbers that float64 holds exactly."""
+    numbers = numeric(data, what, losses)
+    losses.add(what, *(name for name, values in numbers.items() if not is_exact_in_float64(values)))
+    return {name: values for name, values in numbers.items() if is_exact_in_float64(values)}
 
 
 def _divisions(mesh: Mesh, losses: Losses) -> tuple[Regions | None, Integers, dict[str, Array]]:

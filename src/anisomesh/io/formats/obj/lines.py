@@ -37,7 +37,7 @@ class Lines:
         return np.array(found, dtype=np.int64)
 
     def rest(self, number: int) -> str:
-        """Return what follows the first word of a line; names may have a # in them, as those of 3ds Max."""
+        """Return what follows the first word of a line; names may have a # in them, as in files of 3ds Max."""
         words = self.lines[number].strip().split(None, 1)
         return " ".join(words[1].decode("utf-8", errors="replace").split()) if len(words) > 1 else ""
 

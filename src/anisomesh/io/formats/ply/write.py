@@ -9,7 +9,7 @@ import numpy as np
 from anisomesh.attributes.model import Mesh
 from anisomesh.io.carried import COLOUR, NORMAL, UV, Array, separate_columns
 from anisomesh.io.formats.ply.header import PLY_TYPES, REGIONS, TEXTURE_FILE
-from anisomesh.io.holding import Losses, flat_rows, name_of, numeric, regions_as_integers
+from anisomesh.io.holding import Losses, flat_rows, is_exact_in_float64, name_of, numeric, regions_as_integers
 
 _COLUMNS = {  # names of the columns of arrays, by name and width
     (COLOUR, 3): ("red", "green", "blue"),
@@ -20,7 +20,6 @@ _COLUMNS = {  # names of the columns of arrays, by name and width
 _UV_LIST = "texcoord"
 _NAMES_OF_TYPES = {kind: name for name, kind in reversed(PLY_TYPES.items())}  # the first name of each
 _LONG = ("i8", "u8")
-_LARGEST_EXACT = 2**53  # up to it every integer has a float64
 _MAX_LIST = 255  # values, since sizes are written as one byte
 
 
@@ -79,10 +78,9 @@ def _exact(values: Array) -> Array | None:
     if values.dtype.str[1:] not in _LONG:
         return values
     limits = np.iinfo(np.int32)
-    low, high = int(values.min()), int(values.max())
-    if limits.min <= low and high <= limits.max:
+    if limits.min <= values.min() and values.max() <= limits.max:
         return values.astype(np.int32)
-    return values.astype(np.float64) if max(-low, high) <= _LARGEST_EXACT else None
+    return values.astype(np.float64) if is_exact_in_float64(values) else None
 
 
 def _corner_lists(face: Mapping[str, Array], data: Mapping[str, Array], losses: Losses) -> dict[str, Array]:

@@ -23,7 +23,7 @@ class _Groups(Protocol):
 
 
 def number(text: str) -> int:
-    """Return a number of a group or a member, :data:`NONE` if it is none."""
+    """Return the number of a group or a member, :data:`NONE` for other text."""
     return int(text) if text.isdecimal() and len(text) < 18 else NONE
 
 
@@ -98,7 +98,7 @@ def _members(table: Integers, members: Integers) -> Integers:
 
 
 def _rgba(text: str) -> tuple[int, ...]:
-    """Return the numbers of a colour such as #FF8000 or #FF8000FF; white if it is none."""
+    """Return the numbers of a colour such as #FF8000 or #FF8000FF; white for other text."""
     try:
         parts = tuple(bytes.fromhex(text.removeprefix("#")))
     except ValueError:

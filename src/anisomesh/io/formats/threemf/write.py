@@ -71,7 +71,7 @@ def _properties(mesh: Mesh, losses: Losses) -> tuple[str, Array]:
 
 
 def _materials(mesh: Mesh, materials: Regions) -> tuple[str, Array]:
-    """Return the group of base materials and the attributes of triangles; label 0 without a name is no material."""
+    """Return the group of base materials and the attributes of triangles; label 0 without a name stands for none."""
     given = mesh.materials.get("display_colours")
     displayed = given if isinstance(given, Mapping) else {}
     labels = [label for label in np.unique(materials.labels).tolist() if label > 0 or label in materials.names]
