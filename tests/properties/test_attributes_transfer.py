@@ -329,3 +329,27 @@ def test_charts_of_single_faces_stay_within_them():
 def test_other_types_are_an_error():
     with pytest.raises(MeshError, match="expected a Mesh and a Surface, not Surface and Surface"):
         transfer_attributes(sphere(1), sphere(1))
+
+
+@pytest.mark.filterwarnings("error")
+@pytest.mark.parametrize("seed", range(20))
+def test_values_of_any_soup_come_from_the_source(seed):
+    """Degenerate, non-manifold, repeated and unused: values are finite and within the range of the given ones."""
+    rng = np.random.default_rng(seed)
+    n, m = rng.integers(3, 40, 2)
+    faces, others = (rng.integers(0, size, (rng.integers(1, 60), 3)) for size in (n, m))
+    source = Surface(rng.random((n, 3)) * [1.0, 1.0, rng.choice([0.0, 1e-9, 1.0])], faces)
+    mesh = Mesh(
+        surface=source,
+        point_data={"a": rng.random(n), "k": rng.integers(0, 9, n)},
+        face_data={"b": rng.random((len(faces), 2, 2))},
+        corner_data={"uv": rng.random((len(faces), 3, 2))},
+        regions={"r": Regions(rng.integers(0, 3, len(faces))), "q": Regions(rng.integers(-1, 1, len(faces)))},
+    )
+    result = transfer_attributes(mesh, Surface(rng.random((m, 3)), others))
+    for values in (result.point_data["a"], result.face_data["b"], result.corner_data["uv"]):
+        assert values.min() >= 0.0
+        assert values.max() <= 1.0 + 1e-12
+    assert set(result.point_data["k"]) <= set(mesh.point_data["k"])
+    pairs = [set(zip(*(each.regions[name].labels.tolist() for name in "rq"), strict=True)) for each in (result, mesh)]
+    assert pairs[0] <= pairs[1]

@@ -286,9 +286,22 @@ def test_a_decimation_is_fitted_where_the_options_say_so_and_faults_leave_the_me
     assert fitted.n_points == alone.n_points == 200
     assert not np.array_equal(fitted.points, alone.points)
     undecimated = Decimated(surface=part, crease_edges=NO_EDGES)
-    monkeypatch.setattr("anisomesh.fitting.valid.decimate", lambda surface, n_points, held: undecimated)
+    monkeypatch.setattr("anisomesh.fitting.valid.decimate", lambda surface, n_points, **_: undecimated)
     again = fit_without_faults(mesh, nearest, crease_edges=NO_EDGES)
     np.testing.assert_array_equal(again.points, alone.points)
+
+
+def test_only_points_and_edges_on_lines_are_held():
+    part = shapes.box((1.0, 1.0, 1.0), n=4)
+    ends = part.points[part.edges]
+    sharp = part.edges[sharp_edges(part, 40.0)].astype(np.int64)
+    lines = part.edges[(ends[..., 0] == 0.0).all(axis=1) & (ends[..., 2] == 0.0).all(axis=1)].astype(np.int64)
+    target = dataclasses.replace(target_of(part), lines=lines)
+    task = target.task(part, sharp)
+    expected = target.at_corners(part.points)
+    expected[lines] = True
+    np.testing.assert_array_equal(task.held, expected)
+    np.testing.assert_array_equal(part.edges[task.kept], np.unique(np.sort(lines, axis=1), axis=0))
 
 
 def test_the_price_rises_until_the_triangles_are_good_enough():
