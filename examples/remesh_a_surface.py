@@ -9,7 +9,7 @@ import sys
 from pathlib import Path
 
 import anisomesh
-from anisomesh.viz import stretch_colouring
+from anisomesh.viz import side_by_side, stretch_colouring
 
 
 def main(source: Path | None, folder: Path, n_vertices: int = 800) -> anisomesh.RemeshResult:
@@ -23,7 +23,7 @@ def main(source: Path | None, folder: Path, n_vertices: int = 800) -> anisomesh.
         print("warning:", warning)
 
     anisomesh.save(result.surface, folder / "remeshed.ply")
-    anisomesh.side_by_side(surface, result.surface, folder / "remeshed.png", values=stretch_colouring(result.surface))
+    side_by_side(surface, result.surface, folder / "remeshed.png", values=stretch_colouring(result.surface))
     return result
 
 

@@ -27,7 +27,7 @@ if TYPE_CHECKING:
     from anisomesh.evaluation.report import Evaluation, evaluate
     from anisomesh.execution.progress import StepInfo
     from anisomesh.features.network import trace_features
-    from anisomesh.io.meshes import load, save
+    from anisomesh.io.meshes import load, load_mesh, save
     from anisomesh.learn.inference.source import Hybrid, Neural
     from anisomesh.mesh.embedded_surface import EmbeddedSurface
     from anisomesh.mesh.surface import Surface
@@ -38,7 +38,6 @@ if TYPE_CHECKING:
     from anisomesh.repair.prepare import prepare
     from anisomesh.result import RemeshResult, save_rvd
     from anisomesh.shapes.analytic import sample
-    from anisomesh.viz import side_by_side
     from anisomesh.voronoi.restricted import EnergyValue, RestrictedVoronoi
 
     __version__: str
@@ -49,18 +48,18 @@ _MODULE_OF = {
     "RemeshOptions": "options",
     "RemeshResult": "result",
     "StepInfo": "execution.progress",
-    # meshes in and out, judged and drawn
+    # meshes in and out, and judged
     "Surface": "mesh.surface",
     "Mesh": "attributes.model",
     "Regions": "attributes.model",
     "transfer_attributes": "attributes.transfer",
     "load": "io.meshes",
+    "load_mesh": "io.meshes",
     "save": "io.meshes",
     "save_rvd": "result",
     "sample": "shapes.analytic",
     "evaluate": "evaluation.report",
     "Evaluation": "evaluation.report",
-    "side_by_side": "viz",
     # the stages by themselves
     "prepare": "repair.prepare",
     "MetricField": "metric.field",
@@ -130,6 +129,7 @@ __all__ = [
     "energy_from_kernel",
     "evaluate",
     "load",
+    "load_mesh",
     "mesh_from_sites",
     "optimise_sites",
     "precomputed_embedding",
@@ -138,7 +138,6 @@ __all__ = [
     "sample",
     "save",
     "save_rvd",
-    "side_by_side",
     "trace_features",
     "transfer_attributes",
 ]

@@ -28,7 +28,7 @@ from anisomesh.features.tagged import distance_to_crease_edges
 from anisomesh.fitting.target import FitTarget
 from anisomesh.fitting.valid import fit_without_faults
 from anisomesh.io.describe import soundness
-from anisomesh.io.meshes import surface_of
+from anisomesh.io.meshes import mesh_of
 from anisomesh.mesh.surface import Surface
 from anisomesh.mesh.validity import Validity, check_validity
 from anisomesh.metric.conformity import Conformity, MetricExtent, conformity
@@ -110,11 +110,8 @@ def remesh(
         raise OptionError(f"on_step = {on_step!r}; expected a function of a StepInfo")
     run = Run(on_step or ignore_steps, deadline)
     n_vertices, ratio, max_error = read_target(n_vertices, ratio, max_error, options)
-    if isinstance(mesh, Mesh) and faces is None:
-        given = mesh
-    else:
-        with run.stage("load") if isinstance(mesh, str | os.PathLike) else nullcontext():
-            given = Mesh(surface=surface_of(mesh, faces))
+    with run.stage("load") if isinstance(mesh, str | os.PathLike) else nullcontext():
+        given = mesh_of(mesh, faces)
     with run.stage("prepare"):
         source = prepared_input(given, options)
     prepared = source.prepared.surface

@@ -1,15 +1,17 @@
-"""The readers on twenty thousand damaged files: one clear error or a mesh, no crash, no hang, no large allocation."""
+"""The readers on thirty thousand damaged files: one clear error or a mesh, no crash, no hang, no large allocation."""
 
 import re
 import struct
 import time
 import tracemalloc
+from pathlib import Path
 
 import numpy as np
 import pytest
 
+from anisomesh.attributes.model import Mesh, Regions
 from anisomesh.errors import MeshFileError
-from anisomesh.io.meshes import MESH_FORMATS, load, save
+from anisomesh.io.meshes import MESH_FORMATS, load_mesh, save
 from anisomesh.mesh.surface import Surface
 
 pytestmark = pytest.mark.slow
@@ -55,6 +57,89 @@ RAW_VTP = b"""<VTKFile type="PolyData" byte_order="LittleEndian"><PolyData><Piec
 <AppendedData encoding="raw">_%b</AppendedData></VTKFile>""" % struct.pack(
     "<I9fI3iIi", 36, *np.eye(3).ravel(), 12, 0, 1, 2, 4, 3
 )
+FULL_OBJ = """mtllib a.mtl
+v 0 0 0 1 0 0
+v 1 0 0 0 1 0
+v 0 1 0 0 0 1
+v 0 0 1 1 1 1
+vt 0 0
+vt 1 0
+vn 0 0 1
+o a thing
+g part one
+usemtl wood
+s 1
+f 1/1/1 2/2/1 3/1/1
+usemtl stone
+s off
+f -1/-1/-1 -3/-2/-1 -2/-1/-1
+l 1 2 3
+p 4
+"""
+FULL_PLY = """ply
+format ascii 1.0
+comment TextureFile a.png
+comment regions part 1 one
+element vertex 4
+property float x
+property float y
+property float z
+property uchar red
+property uchar green
+property uchar blue
+property float v_0
+property float v_1
+property list uchar int tags
+element face 2
+property list uchar int vertex_indices
+property list uchar float texcoord
+property int part
+element edge 1
+property int vertex1
+property int vertex2
+end_header
+0 0 0 1 2 3 .5 .5 2 1 2
+1 0 0 1 2 3 .5 .5 2 1 2
+0 1 0 1 2 3 .5 .5 2 1 2
+0 0 1 1 2 3 .5 .5 2 1 2
+3 0 1 2 6 0 0 1 0 0 1 1
+3 1 2 3 6 0 0 1 0 0 1 2
+0 1
+"""
+FULL_MEDIT = """MeshVersionFormatted 2
+Dimension 3
+Vertices 4
+0 0 0 1
+1 0 0 0
+0 1 0 0
+0 0 1 3
+Triangles 2
+1 2 3 5
+2 3 4 6
+Edges 2
+1 2 0
+2 4 7
+Ridges 1
+1
+RequiredEdges 1
+2
+Corners 1
+1
+RequiredVertices 1
+4
+Normals 1
+0 0 1
+NormalAtVertices 1
+2 1
+End
+"""
+FULL_MSH = (
+    TEXT_MSH.replace("$Nodes", '$PhysicalNames\n1\n2 8 "left"\n$EndPhysicalNames\n$Nodes', 1).replace(
+        "$Nodes", "$Entities\n0 0 1 0\n1 0 0 0 1 1 0 1 8 0\n$EndEntities\n$Nodes", 1
+    )
+    + '$NodeData\n1\n"a"\n1\n0\n3\n0\n1\n4\n1 1\n7 2\n9 3\n40 4\n$EndNodeData\n'
+    + '$ElementData\n1\n"b"\n1\n0\n3\n0\n3\n2\n1 1 2 3\n2 4 5 6\n$EndElementData\n'
+)
 U_OBJ = "".join(f"v {x} {y} 0\n" for x, y in [(0, 0), (3, 0), (3, 3), (2, 3), (2, 1), (1, 1), (1, 3), (0, 3)])
 KINDS = {
     **dict.fromkeys(MESH_FORMATS),
@@ -65,6 +150,12 @@ KINDS = {
     "ascii.vtu": ASCII_VTU,
     "raw.vtp": RAW_VTP,
     "concave.obj": U_OBJ + "f 1 2 3 4 5 6 7 8\n",
+    "full.off": "STCNOFF\n3 1 0\n" + 3 * "0 0 1 0 0 1 9 8 7 1 .5 1\n" + "3 0 1 2 .5 .25 1 1\n",
+    "full.obj": FULL_OBJ,
+    "full.ply": FULL_PLY,
+    "full.mesh": FULL_MEDIT,
+    "full.msh": FULL_MSH,
+    **{f"full{suffix}": None for suffix in (".glb", ".3mf", ".vtu", ".vtp")},
 }
 HOSTILE = [b"999999999", b"-1", b"4294967295", b"1e308", b"nan", b"99999999999999999999", b"", b"0"]
 
@@ -73,7 +164,18 @@ def original(kind, tmp_path):
     if KINDS[kind] is not None:
         return KINDS[kind] if isinstance(KINDS[kind], bytes) else KINDS[kind].encode()
     path = tmp_path / f"original{kind}"
-    save(Surface(np.random.default_rng(0).normal(size=(8, 3)), np.array([[0, 1, 2], [3, 4, 5], [5, 6, 7]])), path)
+    rng = np.random.default_rng(0)
+    surface = Surface(rng.normal(size=(8, 3)), np.array([[0, 1, 2], [3, 4, 5], [5, 6, 7]]))
+    mesh = Mesh(
+        surface=surface,
+        point_data={"a": rng.normal(size=8), "color": rng.integers(0, 256, (8, 4), dtype=np.uint8)},
+        face_data={"b": rng.normal(size=(3, 2))},
+        corner_data={"uv": rng.uniform(size=(3, 3, 2))},
+        regions={name: Regions([1, 1, 2], {1: "one", 2: "two"}) for name in ("object", "material")},
+        features=[[0, 1], [3, 4]],
+        fixed_points=[0, 5],
+    )
+    save(mesh if kind.startswith("full") else surface, path)
     return path.read_bytes()
 
 
@@ -104,9 +206,9 @@ def damaged(data, rng):
 def test_damaged_files(kind, tmp_path, capfd):
     rng = np.random.default_rng(1)
     data = original(kind, tmp_path)
-    path = tmp_path / (kind if KINDS[kind] else f"mesh{kind}")
+    path = tmp_path / (kind if KINDS[kind] else f"mesh{Path(kind).suffix or kind}")
     path.write_bytes(data)
-    load(path)  # what it imports and caches is not counted below
+    load_mesh(path)  # what it imports and caches is not counted below
     errors = 0
     try:
         for case in range(CASES):
@@ -115,14 +217,14 @@ def test_damaged_files(kind, tmp_path, capfd):
                 tracemalloc.start()
             start = time.process_time()
             try:
-                surface = load(path)
+                mesh = load_mesh(path)
             except MeshFileError as error:
                 errors += 1
                 assert str(error).startswith(f"{path}: "), case
                 assert len(str(error).splitlines()) == 1, case
             else:
-                assert surface.n_faces >= 1, case
-                assert np.isfinite(surface.points).all(), case
+                assert mesh.surface.n_faces >= 1, case
+                assert np.isfinite(mesh.surface.points).all(), case
             assert time.process_time() - start < MOST_SECONDS, case
             assert tracemalloc.get_traced_memory()[1] < MOST_BYTES, case  # 0 where nothing is traced
             tracemalloc.stop()

@@ -2,6 +2,7 @@
 
 import logging
 import time
+from types import SimpleNamespace
 
 import meshio
 import numpy as np
@@ -9,7 +10,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from anisomesh.io.formats.vtk_xml import vtp_bytes
+from anisomesh.io.formats.vtk.write import vtp_bytes
 from anisomesh.io.meshes import load
 from anisomesh.io.polygons import PolygonSoup, as_triangles, triangulate
 from conftest import examples
@@ -39,7 +40,8 @@ def signed_areas(xy, faces):
 
 def triangles_of(points, *polygons):
     soup = PolygonSoup(points=points, corners=np.concatenate(polygons), sizes=np.array([len(p) for p in polygons]))
-    return triangulate(soup)
+    found = triangulate(soup)
+    return SimpleNamespace(faces=soup.corners[found.corners], polygon=found.polygon, overlapping=found.overlapping)
 
 
 def check_cover(xy, faces, *, flat=0):
@@ -200,7 +202,7 @@ def test_concave_faces_of_files(tmp_path, suffix):
 def test_odd_parts_are_left_out_and_named():
     points = np.vstack([np.eye(3), [np.nan] * 3])
     soup = PolygonSoup(points=points, corners=np.array([0, 1, 0, 1, 2, 0]), sizes=np.array([2, 3, 1]))
-    surface, source, remarks = as_triangles(soup)
+    surface, source, _, remarks = as_triangles(soup)
     assert source.tolist() == [1]
     assert surface.n_points == 4
     assert len(remarks) == 2

@@ -7,7 +7,7 @@ import tempfile
 import time
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, BinaryIO
 
 import typer
 
@@ -15,6 +15,7 @@ from anisomesh.cli.progress import Display, announce_compilation
 from anisomesh.cli.report import write_json
 
 if TYPE_CHECKING:
+    from anisomesh.attributes.model import Mesh
     from anisomesh.mesh.surface import Surface
     from anisomesh.result import RemeshResult
 
@@ -91,7 +92,7 @@ class Outputs:
         if self.paths:
             display.note(f"writing {', '.join(str(path) for path in self.paths)}")
         if self.mesh != STANDARD_STREAM:
-            save(result.surface, self.mesh, file_format=self.mesh_format)
+            save(result.mesh, self.mesh, file_format=self.mesh_format)
         if self.report is not None:
             write_json(facts, self.report)
         if self.rvd is not None:
@@ -103,7 +104,7 @@ class Outputs:
 
             side_by_side(result.prepared, result.surface, self.picture)
         if self.mesh == STANDARD_STREAM:
-            save(result.surface, sys.stdout.buffer, file_format=self.mesh_format)
+            save(result.mesh, sys.stdout.buffer, file_format=self.mesh_format)
 
 
 def default_output(source: Path, input_format: str | None, output_format: str | None) -> Path:
@@ -199,7 +200,7 @@ def check_picture_path(path: Path, option: str) -> None:
 
 
 def read(path: Path, file_format: str | None = None) -> tuple[Surface, float]:
-    """Read a mesh file, or standard input, and return the mesh and the time in seconds.
+    """Read a mesh file, or standard input, and return the surface and the time in seconds.
 
     Parameters
     ----------
@@ -211,9 +212,22 @@ def read(path: Path, file_format: str | None = None) -> tuple[Surface, float]:
     from anisomesh.io.meshes import load
 
     start = time.perf_counter()
-    is_stream = path == STANDARD_STREAM and file_format is not None
-    surface = load(sys.stdin.buffer if is_stream else path, file_format=file_format)
+    surface = load(_source(path, file_format), file_format=file_format)
     return surface, time.perf_counter() - start
+
+
+def read_mesh(path: Path, file_format: str | None = None) -> tuple[Mesh, float]:
+    """Read a mesh with everything that it carries; otherwise as :func:`read`."""
+    from anisomesh.io.meshes import load_mesh
+
+    start = time.perf_counter()
+    mesh = load_mesh(_source(path, file_format), file_format=file_format)
+    return mesh, time.perf_counter() - start
+
+
+def _source(path: Path, file_format: str | None) -> Path | BinaryIO:
+    is_stream = path == STANDARD_STREAM and file_format is not None
+    return sys.stdin.buffer if is_stream else path
 
 
 def check_input_format(path: Path, file_format: str | None) -> None:
@@ -225,13 +239,13 @@ def check_input_format(path: Path, file_format: str | None) -> None:
 
 
 def run_remesh(
-    surface: Surface, display: Display, *, name: str, load_seconds: float, **options: Any
+    mesh: Surface | Mesh, display: Display, *, name: str, load_seconds: float, **options: Any
 ) -> tuple[RemeshResult, dict[str, Any]]:
     """Remesh with progress and return the result and its report.
 
     Parameters
     ----------
-    surface
+    mesh
         The input, in model units.
     display
         Shows the progress.
@@ -264,7 +278,7 @@ def run_remesh(
         *(["network"] if embedding_name(source) in ("neural", "hybrid") else []),
     ]
     announce_compilation(display, *works)
-    result = remesh(surface, on_step=display, **options)
+    result = remesh(mesh, on_step=display, **options)
     report = result.report()
     seconds = report["seconds"]
     seconds |= {"load": load_seconds, "total": seconds["total"] - seconds.get("load", 0.0) + load_seconds}

@@ -18,14 +18,7 @@ from anisomesh.cli.arguments import (
     takes_remesh_options,
     target_option,
 )
-from anisomesh.cli.job import (
-    STANDARD_STREAM,
-    Outputs,
-    check_input_format,
-    default_output,
-    read,
-    run_remesh,
-)
+from anisomesh.cli.job import STANDARD_STREAM, Outputs, check_input_format, default_output, read_mesh, run_remesh
 from anisomesh.cli.progress import progress
 from anisomesh.cli.report import as_json, hints, summary
 
@@ -119,13 +112,13 @@ def command(
         options["features"] = None if features is None else load_pairs(features)
         options["density"] = None if density is None else load_numbers(density)
     with progress(quiet) as display:
-        surface, seconds = read(source, input_format)
+        mesh, seconds = read_mesh(source, input_format)
         options |= {"n_vertices": n_vertices, "ratio": ratio}
-        options["max_error"] = None if error is None else error.on(surface)
-        options["edge_length"] = None if length is None else length.on(surface)
+        options["max_error"] = None if error is None else error.on(mesh.surface)
+        options["edge_length"] = None if length is None else length.on(mesh.surface)
         if weld is not None:
-            options["weld_tolerance"] = "auto" if gap is None else gap.on(surface)
-        result, facts = run_remesh(surface, display, name=str(source), load_seconds=seconds, **options)
+            options["weld_tolerance"] = "auto" if gap is None else gap.on(mesh.surface)
+        result, facts = run_remesh(mesh, display, name=str(source), load_seconds=seconds, **options)
         facts["hints"] = hints(result.prepared)
         facts["options"] |= {
             "features": None if features is None else str(features),

@@ -14,7 +14,7 @@ from anisomesh.evaluation.preservation import FeaturePreservation, feature_prese
 from anisomesh.evaluation.sampled import CREASE_ANGLE, DEFAULT_SAMPLES, SampledMeasures, sampled_measures
 from anisomesh.evaluation.shape import ShapeStatistics, quality_in_reference_metric, shape_statistics
 from anisomesh.io.describe import html_table, soundness
-from anisomesh.io.meshes import surface_of
+from anisomesh.io.meshes import mesh_of
 from anisomesh.mesh.closest_points import ClosestPoints
 from anisomesh.mesh.distance import SurfaceDistance, surface_distance
 from anisomesh.mesh.geometry import unit_frame
@@ -134,10 +134,10 @@ def evaluate(
     samples, seed = whole_number("samples", samples, 1), whole_number("seed", seed, 0)
     if not 0.0 <= real_number("crease_angle", crease_angle) <= 180.0:
         raise OptionError(f"crease_angle = {crease_angle}; expected 0 to 180 degrees")
-    repaired = prepare(surface_of(reference)).surface
+    repaired = prepare(mesh_of(reference).surface).surface
     frame = unit_frame(repaired.points)
     a = repaired.with_points(frame.to_unit(repaired.points))
-    remeshed = surface_of(result)
+    remeshed = mesh_of(result).surface
     b = Surface(frame.to_unit(remeshed.points), remeshed.faces)
     closest = ClosestPoints(a)
     squared = closest.squared_distances(b.points[np.unique(b.faces)])

@@ -3,11 +3,13 @@
 from __future__ import annotations
 
 from collections import Counter
+from dataclasses import replace
 from typing import Any, Literal, NamedTuple
 
 import numpy as np
 import numpy.typing as npt
 
+from anisomesh.io.carried import Carried
 from anisomesh.io.polygons import Integers, PolygonSoup
 
 Shape = Literal["triangle", "quad"]
@@ -106,8 +108,10 @@ class SurfaceCells:
         """Count cells of this name that are not part of a surface, such as lines or tetrahedra."""
         self._others[name] += count
 
-    def soup(self, points: npt.NDArray[np.float64], remarks: tuple[str, ...] = ()) -> PolygonSoup:
-        """Return the surface cells as polygons, in the order of the file.
+    def soup(
+        self, points: npt.NDArray[np.float64], remarks: tuple[str, ...] = (), carried: Carried | None = None
+    ) -> PolygonSoup:
+        """Return the surface cells as polygons, in the order of the file, with what else the file carries.
 
         Raises
         ------
@@ -132,11 +136,12 @@ class SurfaceCells:
         if n_higher:
             way = "split at the nodes of their sides" if split else "read as polygons of their corners"
             remarks = (*remarks, f"{n_higher} cell(s) of higher order were {way}")
-        return _in_file_order(points, polygons, remarks)
+        soup = _in_file_order(points, polygons, carried or Carried())
+        return replace(soup, remarks=remarks)
 
 
 def _in_file_order(
-    points: npt.NDArray[np.float64], parts: list[tuple[Integers, Integers, Integers]], remarks: tuple[str, ...]
+    points: npt.NDArray[np.float64], parts: list[tuple[Integers, Integers, Integers]], carried: Carried
 ) -> PolygonSoup:
     none = np.zeros(0, dtype=np.int64)
     corners, sizes, source = (np.concatenate([none, *(part[k] for part in parts)]) for k in range(3))
@@ -145,8 +150,10 @@ def _in_file_order(
         first = (np.cumsum(sizes) - sizes)[order]
         sizes, source = sizes[order], source[order]
         step = np.arange(len(corners)) - np.repeat(np.cumsum(sizes) - sizes, sizes)
-        corners = corners[np.repeat(first, sizes) + step]
-    return PolygonSoup(points=points, corners=corners, sizes=sizes, source=source, remarks=remarks)
+        rows = np.repeat(first, sizes) + step
+        corners = corners[rows]
+        carried.take_corners(rows)
+    return PolygonSoup(points=points, corners=corners, sizes=sizes, source=source, carried=carried)
 
 
 def strip_triangles(strip: npt.NDArray[Any]) -> Integers:

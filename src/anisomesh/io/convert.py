@@ -46,10 +46,10 @@ def as_surface(mesh: Any, faces: npt.NDArray[Any] | None = None) -> Surface:
     try:
         soup = polygon_soup(mesh)
         if soup is not None:
-            surface, _, remarks = as_triangles(soup)
-            for remark in remarks:
+            triangles = as_triangles(soup)
+            for remark in triangles.remarks:
                 logger.warning("%s: %s", name, remark)
-            return surface
+            return triangles.surface
     except ValueError as error:
         raise MeshError(f"cannot read a surface from {name}: {error}") from error
     if hasattr(mesh, "vertices") and hasattr(mesh, "faces"):  # trimesh

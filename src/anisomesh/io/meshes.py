@@ -5,35 +5,67 @@ from __future__ import annotations
 import logging
 import os
 from collections.abc import Callable, Mapping
+from dataclasses import replace
 from pathlib import Path
 from typing import Any, BinaryIO
 
 import numpy as np
 import numpy.typing as npt
 
+from anisomesh.attributes.model import Mesh
 from anisomesh.errors import MeshError, MeshFileError
-from anisomesh.io import polygons
+from anisomesh.io import material_files
+from anisomesh.io.assemble import as_mesh
 from anisomesh.io.atomic import atomic_path
 from anisomesh.io.convert import as_surface
-from anisomesh.io.formats import glb, gmsh, medit, obj, off, ply, stl, threemf, vtk_xml
+from anisomesh.io.formats.gltf.read import read_glb
+from anisomesh.io.formats.gltf.write import glb_bytes
+from anisomesh.io.formats.gmsh.read import read_msh
+from anisomesh.io.formats.gmsh.write import msh_bytes
+from anisomesh.io.formats.medit.read import read_medit
+from anisomesh.io.formats.medit.write import medit_bytes
+from anisomesh.io.formats.obj.read import read_obj
+from anisomesh.io.formats.obj.write import obj_bytes
+from anisomesh.io.formats.off import off_bytes, read_off
+from anisomesh.io.formats.ply.read import read_ply
+from anisomesh.io.formats.ply.write import ply_bytes
+from anisomesh.io.formats.stl import read_stl, stl_bytes
+from anisomesh.io.formats.threemf.read import read_3mf
+from anisomesh.io.formats.threemf.write import threemf_bytes
+from anisomesh.io.formats.vtk.read import read_vtp, read_vtu
+from anisomesh.io.formats.vtk.write import vtp_mesh_bytes, vtu_mesh_bytes
 from anisomesh.io.formats.words import BYTE_ORDER_MARK
+from anisomesh.io.holding import Losses
+from anisomesh.io.polygons import PolygonSoup
 from anisomesh.mesh.surface import Surface
 
 logger = logging.getLogger(__name__)
 
 PointData = Mapping[str, npt.NDArray[Any]]  # arrays (V,) or (V, k) by name
 
-_READERS: dict[str, Callable[[bytes], polygons.PolygonSoup]] = {
-    ".obj": obj.read_obj,
-    ".off": off.read_off,
-    ".ply": ply.read_ply,
-    ".stl": stl.read_stl,
-    ".glb": glb.read_glb,
-    ".3mf": threemf.read_3mf,
-    ".vtu": vtk_xml.read_vtu,
-    ".vtp": vtk_xml.read_vtp,
-    ".msh": gmsh.read_msh,
-    ".mesh": medit.read_medit,
+_READERS: dict[str, Callable[[bytes], PolygonSoup]] = {
+    ".obj": read_obj,
+    ".off": read_off,
+    ".ply": read_ply,
+    ".stl": read_stl,
+    ".glb": read_glb,
+    ".3mf": read_3mf,
+    ".vtu": read_vtu,
+    ".vtp": read_vtp,
+    ".msh": read_msh,
+    ".mesh": read_medit,
+}
+_WRITERS: dict[str, Callable[[Mesh, Losses], bytes]] = {
+    ".obj": obj_bytes,
+    ".off": off_bytes,
+    ".ply": ply_bytes,
+    ".stl": stl_bytes,
+    ".glb": glb_bytes,
+    ".3mf": threemf_bytes,
+    ".vtu": vtu_mesh_bytes,
+    ".vtp": vtp_mesh_bytes,
+    ".msh": msh_bytes,
+    ".mesh": medit_bytes,
 }
 _TEXT_FORMATS = (".obj", ".off", ".ply", ".msh", ".mesh")  # may begin with a byte order mark
 MESH_FORMATS = tuple(_READERS)
@@ -41,7 +73,7 @@ MESH_FORMATS = tuple(_READERS)
 
 
 def load(path: str | os.PathLike[str] | BinaryIO, *, file_format: str | None = None) -> Surface:
-    """Read a surface mesh.
+    """Read a surface mesh without attributes; :func:`load_mesh` reads these too.
 
     Parameters
     ----------
@@ -67,10 +99,49 @@ def load(path: str | os.PathLike[str] | BinaryIO, *, file_format: str | None = N
     -----
     Quadrilaterals are split along their shorter diagonal, larger polygons into fans; concave ones by ear clipping.
     Cells of second order are split at the nodes of their sides if the whole surface is of second order; otherwise cells
-    of higher order are read as polygons of their corners. Lines and volume cells are ignored. Whatever else is left out
-    is named in a warning in the log. STL stores unconnected triangles; corners with equal coordinates are welded, which
-    is logged.
+    of higher order are read as polygons of their corners. Volume cells are ignored. Whatever else is left out of the
+    geometry is named in a warning in the log. STL stores unconnected triangles; corners with equal coordinates are
+    welded, which is logged.
     """
+    return _read(path, file_format)[1].surface
+
+
+def load_mesh(path: str | os.PathLike[str] | BinaryIO, *, file_format: str | None = None) -> Mesh:
+    """Read a surface mesh with everything that the file carries.
+
+    Parameters
+    ----------
+    path, file_format
+        As for :func:`load`.
+
+    Returns
+    -------
+    Mesh
+        The surface that :func:`load` returns, with the data of its points, faces and corners, regions, lines as
+        features, and materials. Triangles have the data of the polygon or cell that they are part of.
+
+    Raises
+    ------
+    MeshFileError
+        As for :func:`load`: the geometry must be readable.
+
+    Notes
+    -----
+    Texture coordinates are called ``uv``, unit normals ``normal`` and colours ``color``, whatever the format calls
+    them. Attributes that are broken, or that a :class:`Mesh` cannot hold, are left out, with a line each in the log.
+    The materials of an OBJ file are read from the .mtl files beside it.
+    """
+    name, mesh, losses = _read(path, file_format)
+    if isinstance(path, str | os.PathLike):
+        mesh, more = material_files.read_beside(mesh, Path(path))
+        losses += more
+    for loss in losses:
+        logger.warning("%s: %s", name, loss)
+    return mesh
+
+
+def _read(path: str | os.PathLike[str] | BinaryIO, file_format: str | None) -> tuple[str, Mesh, tuple[str, ...]]:
+    """Return the name of a file or stream, what it contains, and which attributes were left out."""
     name, suffix, data = _content(path, file_format)
     if not data.strip():
         raise MeshFileError(f"{name}: the file is empty; expected a mesh")
@@ -78,8 +149,7 @@ def load(path: str | os.PathLike[str] | BinaryIO, *, file_format: str | None = N
         if suffix in _TEXT_FORMATS:
             data = data.removeprefix(BYTE_ORDER_MARK)
         with np.errstate(over="ignore", invalid="ignore"):  # what is not finite is reported by polygons.validate
-            soup = _READERS[suffix](data)
-        surface, _, remarks = polygons.as_triangles(soup)
+            mesh, remarks, losses = as_mesh(_READERS[suffix](data))
     except Exception as error:
         # Our readers raise ValueError with an explanation; other exceptions come from libraries.
         reason = str(error)
@@ -89,16 +159,16 @@ def load(path: str | os.PathLike[str] | BinaryIO, *, file_format: str | None = N
         raise MeshFileError(f"{name}: cannot be read as {suffix[1:].upper()}: {reason}") from error
     for remark in remarks:
         logger.warning("%s: %s", name, remark)
-    return surface
+    return name, mesh, losses
 
 
-def surface_of(mesh: Any, faces: npt.NDArray[Any] | None = None) -> Surface:
-    """Return a mesh in any form: the name of a file, arrays, or an object of a library.
+def mesh_of(mesh: Any, faces: npt.NDArray[Any] | None = None) -> Mesh:
+    """Return a mesh in any form: a mesh with attributes, the name of a file, arrays, or an object of a library.
 
     Parameters
     ----------
     mesh
-        A path, read by :func:`load`, or what :func:`~anisomesh.io.convert.as_surface` takes.
+        A :class:`Mesh`; a path, read by :func:`load_mesh`; or what :func:`~anisomesh.io.convert.as_surface` takes.
     faces
         Triangles (F, 3) if ``mesh`` is an array of points.
 
@@ -109,11 +179,12 @@ def surface_of(mesh: Any, faces: npt.NDArray[Any] | None = None) -> Surface:
     MeshError
         If the object is not a mesh, or there are faces besides a file.
     """
-    if not isinstance(mesh, str | os.PathLike):
-        return as_surface(mesh, faces)
+    if not isinstance(mesh, str | os.PathLike | Mesh):
+        return Mesh(surface=as_surface(mesh, faces))
     if faces is not None:
-        raise MeshError(f"the mesh is the file {os.fspath(mesh)} and has faces; leave out the second argument")
-    return load(mesh)
+        what = "a Mesh" if isinstance(mesh, Mesh) else f"the file {os.fspath(mesh)}"
+        raise MeshError(f"the mesh is {what} and has faces; leave out the second argument")
+    return mesh if isinstance(mesh, Mesh) else load_mesh(mesh)
 
 
 def _content(path: str | os.PathLike[str] | BinaryIO, file_format: str | None) -> tuple[str, str, bytes]:
@@ -138,64 +209,74 @@ def _content(path: str | os.PathLike[str] | BinaryIO, file_format: str | None) -
 
 
 def save(
-    surface: Any,
+    mesh: Any,
     path: str | os.PathLike[str] | BinaryIO,
     *,
     point_data: PointData | None = None,
     file_format: str | None = None,
 ) -> None:
-    """Write a surface mesh, a file atomically.
+    """Write a surface mesh with everything that it carries, a file atomically.
 
     Parameters
     ----------
-    surface
-        The mesh to write: whatever :func:`~anisomesh.io.convert.as_surface` takes.
+    mesh
+        A :class:`Mesh`, or whatever :func:`~anisomesh.io.convert.as_surface` takes.
     path
         The file, with one of the extensions of :func:`load`; an existing file is replaced. Or a stream that is open for
         writing bytes, together with ``file_format``.
     point_data
-        Arrays (V,) or (V, k) by name. VTU and VTP store all of them, PLY scalars only; arrays that the format
-        cannot store are omitted with a warning in the log.
+        Arrays (V,) or (V, k) by name, in addition.
     file_format
         The format, such as ``"ply"``, if the extension does not name it.
 
     Raises
     ------
     MeshFileError
-        If the format is unknown, the folder is missing or cannot be written, the disk is full, an array has the wrong
-        length or type, or a coordinate does not fit the format.
+        If the format is unknown, the folder is missing or cannot be written, the disk is full, an array of
+        ``point_data`` has the wrong length or type, or a coordinate does not fit the format.
     MeshError
         If the object is not a mesh.
 
     Notes
     -----
-    OBJ, OFF, PLY, 3MF, VTU, VTP, MSH and MEDIT keep every float64 exactly; STL and GLB round to float32.
+    What the format cannot hold is left out and named in one warning in the log. OBJ, OFF, PLY, 3MF, VTU, VTP, MSH and
+    MEDIT keep every float64 of the coordinates exactly, and so does STL with regions; STL without and GLB round to
+    float32.
     """
     stream: Any = path if not isinstance(path, str | os.PathLike) and hasattr(path, "write") else None
     name = str(_as_path(path)) if stream is None else _stream_name(stream)
-    surface = as_surface(surface)
+    mesh = mesh if isinstance(mesh, Mesh) else Mesh(surface=as_surface(mesh))
     suffix = _known_suffix(name, file_format)
-    data = {}
-    for key, values in (point_data or {}).items():
-        if not isinstance(key, str) or not key:
-            raise MeshFileError(f"{name}: {key!r} is not a name of point data")
-        data[key] = _point_array(name, key, values, surface.n_points)
-    stored = {
-        key: values
-        for key, values in data.items()
-        if suffix in (".vtu", ".vtp") or (suffix == ".ply" and values.ndim == 1)
-    }
-    for key in data.keys() - stored.keys():
-        logger.warning("%s: omitted the point data %r, which %s cannot store", name, key, suffix[1:].upper())
+    if point_data:
+        mesh = _with_point_data(mesh, name, point_data)
+    folder = Path.cwd() if stream is not None else material_files.folder_of(name)
+    mesh = material_files.with_texture_names(mesh, lambda name: material_files.relative_name(name, folder))
+    losses = Losses()
     try:
-        content = _bytes_of(surface, suffix, stored)
+        content = _WRITERS[suffix](mesh, losses)
     except ValueError as error:
         raise MeshFileError(f"{name}: cannot be written: {error}") from error
+    if suffix == ".obj":
+        content = material_files.write_beside(content, mesh, None if stream else Path(name), losses)
     if stream is not None:
         stream.write(content)
     else:
         with atomic_path(name) as temporary:
             temporary.write_bytes(content)
+    if losses.text():
+        format_name = "MEDIT" if suffix == ".mesh" else suffix[1:].upper()
+        logger.warning("%s: left out what %s cannot hold: %s", name, format_name, losses.text())
+
+
+def _with_point_data(mesh: Mesh, path: str, point_data: PointData) -> Mesh:
+    """Return a mesh with more point data, which replace data of the same name."""
+    data = {}
+    for key, values in point_data.items():
+        if not isinstance(key, str) or not key:
+            raise MeshFileError(f"{path}: {key!r} is not a name of point data")
+        data[key] = _point_array(path, key, values, mesh.surface.n_points)
+    corner_data = {key: values for key, values in mesh.corner_data.items() if key not in data}
+    return replace(mesh, point_data={**mesh.point_data, **data}, corner_data=corner_data)
 
 
 def _stream_name(stream: Any) -> str:
@@ -222,33 +303,6 @@ def _point_array(path: str, name: str, values: Any, n_points: int) -> npt.NDArra
     if array.dtype.kind == "b":
         return array.astype(np.uint8)
     return array.astype(np.float64) if array.dtype.itemsize not in (1, 2, 4, 8) or array.dtype == np.float16 else array
-
-
-def _bytes_of(surface: Surface, suffix: str, data: dict[str, npt.NDArray[Any]]) -> bytes:
-    """Return the content of a file of this format."""
-    points, faces = surface.points, surface.faces
-    sizes = np.full(len(faces), 3, dtype=np.int64)
-    match suffix:
-        case ".obj":
-            return obj.obj_text(points, faces).encode()
-        case ".off":
-            return off.off_text(points, faces).encode()
-        case ".mesh":
-            return medit.medit_text(points, faces).encode()
-        case ".ply":
-            return ply.ply_bytes(points, faces, data)
-        case ".stl":
-            return stl.stl_bytes(points, faces)
-        case ".glb":
-            return glb.glb_bytes(points, faces)
-        case ".3mf":
-            return threemf.threemf_bytes(points, faces)
-        case ".vtu":
-            return vtk_xml.vtu_bytes(points, faces, sizes, data)
-        case ".vtp":
-            return vtk_xml.vtp_bytes(points, faces, sizes, data)
-        case _:
-            return gmsh.msh_bytes(points, faces)
 
 
 def _known_suffix(path: str | Path, file_format: str | None) -> str:

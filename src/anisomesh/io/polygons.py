@@ -9,6 +9,7 @@ from typing import Any, NamedTuple
 import numpy as np
 import numpy.typing as npt
 
+from anisomesh.io.carried import Carried
 from anisomesh.mesh.surface import Surface
 
 _FLAT = 1e-14  # twice the area over the squared extent of its polygon up to which a triangle has no area; rounding
@@ -33,6 +34,8 @@ class PolygonSoup:
         there is one for each polygon.
     remarks
         What was left out or changed, a line each.
+    carried
+        What the file carries besides.
     """
 
     points: npt.NDArray[np.float64]
@@ -40,6 +43,7 @@ class PolygonSoup:
     sizes: Integers
     source: Integers = field(default_factory=lambda: np.zeros(0, dtype=np.int64))
     remarks: tuple[str, ...] = ()
+    carried: Carried = field(default_factory=Carried)
 
     def __post_init__(self) -> None:
         if len(self.source) != len(self.sizes):
@@ -47,7 +51,12 @@ class PolygonSoup:
 
     @classmethod
     def from_array(
-        cls, points: npt.NDArray[Any], polygons: npt.NDArray[Any], *, remarks: Sequence[str] = ()
+        cls,
+        points: npt.NDArray[Any],
+        polygons: npt.NDArray[Any],
+        *,
+        remarks: Sequence[str] = (),
+        carried: Carried | None = None,
     ) -> PolygonSoup:
         """Return the soup of polygons (P, k) with k corners each."""
         return cls(
@@ -55,6 +64,7 @@ class PolygonSoup:
             corners=np.asarray(polygons, dtype=np.int64).ravel(),
             sizes=np.full(len(polygons), polygons.shape[1], dtype=np.int64),
             remarks=tuple(remarks),
+            carried=carried or Carried(),
         )
 
 
@@ -63,52 +73,68 @@ class Triangulation(NamedTuple):
 
     Attributes
     ----------
-    faces
-        Point indices (F, 3), in the order of the polygons.
+    corners
+        Numbers of corners of the soup (F, 3), in the order of the polygons.
     polygon
         The polygon of each triangle (F,).
     overlapping
         Polygons (n,) whose triangles overlap, because their outlines cross themselves.
     """
 
-    faces: Integers
+    corners: Integers
     polygon: Integers
     overlapping: Integers
 
 
-def as_triangles(soup: PolygonSoup) -> tuple[Surface, Integers, tuple[str, ...]]:
-    """Return polygons as triangles.
+class Triangles(NamedTuple):
+    """A surface made of polygons.
 
-    Returns
-    -------
+    Attributes
+    ----------
     surface
         All points, in the order of the soup, and the triangles.
     source
         The face or cell of the file that each triangle belongs to (F,).
+    corners
+        The corner of the soup that each corner of a triangle is (F, 3).
     remarks
         What was left out or changed, a line each: what the reader said, polygons of fewer than three corners, unused
         points that are not finite, polygons that cross themselves.
+    """
+
+    surface: Surface
+    source: Integers
+    corners: Integers
+    remarks: tuple[str, ...]
+
+
+def as_triangles(soup: PolygonSoup) -> Triangles:
+    """Return polygons as triangles.
 
     Raises
     ------
     ValueError
         If there is no polygon, an index is out of range, or a coordinate of a polygon is not finite.
     """
-    soup = _without_odd_parts(soup)
+    kept, soup = _without_odd_parts(soup)
     validate(soup)
-    faces, polygon, overlapping = triangulate(soup)
+    corners, polygon, overlapping = triangulate(soup)
     remarks = soup.remarks
     if len(overlapping):
         remarks += (
             f"{len(overlapping)} polygon(s) cross themselves or are far from flat, so that their triangles overlap; "
             f"the first is face {soup.source[overlapping[0]]} (counted from 0)",
         )
-    return Surface(soup.points, faces), soup.source[polygon], remarks
+    surface = Surface(soup.points, soup.corners[corners])
+    return Triangles(surface, soup.source[polygon], corners if kept is None else kept[corners], remarks)
 
 
-def _without_odd_parts(soup: PolygonSoup) -> PolygonSoup:
-    """Leave out polygons of fewer than three corners, and give unused points finite coordinates."""
-    remarks = []
+def _without_odd_parts(soup: PolygonSoup) -> tuple[Integers | None, PolygonSoup]:
+    """Leave out polygons of fewer than three corners, and give unused points finite coordinates.
+
+    Returns the numbers of the corners that are left too, None if all are.
+    """
+    remarks, kept = [], None
     few = soup.sizes < 3
     if few.any() and not few.all():
         first = int(np.flatnonzero(few)[0])
@@ -116,9 +142,10 @@ def _without_odd_parts(soup: PolygonSoup) -> PolygonSoup:
             f"left out {np.count_nonzero(few)} face(s) of fewer than 3 corners; the first is face "
             f"{soup.source[first]} (counted from 0) with {soup.sizes[first]}"
         )
+        kept = np.flatnonzero(~np.repeat(few, soup.sizes))
         soup = replace(
             soup,
-            corners=soup.corners[~np.repeat(few, soup.sizes)],
+            corners=soup.corners[kept],
             sizes=soup.sizes[~few],
             source=soup.source[~few],
         )
@@ -135,7 +162,7 @@ def _without_odd_parts(soup: PolygonSoup) -> PolygonSoup:
             points = soup.points.copy()
             points[unused] = points[np.flatnonzero(used & ~odd)[0]]
             soup = replace(soup, points=points)
-    return replace(soup, remarks=(*soup.remarks, *remarks))
+    return kept, replace(soup, remarks=(*soup.remarks, *remarks))
 
 
 def validate(soup: PolygonSoup) -> None:
@@ -168,7 +195,7 @@ def triangulate(soup: PolygonSoup) -> Triangulation:
     sizes, corners = soup.sizes, soup.corners
     none = np.zeros(0, dtype=np.int64)
     if (sizes == 3).all():
-        return Triangulation(corners.reshape(-1, 3), np.arange(len(sizes)), none)
+        return Triangulation(np.arange(len(corners)).reshape(-1, 3), np.arange(len(sizes)), none)
     first = np.cumsum(sizes) - sizes
     polygon = np.repeat(np.arange(len(sizes)), sizes - 2)
     rank = np.arange(len(polygon)) - np.repeat(np.cumsum(sizes - 2) - (sizes - 2), sizes - 2)
@@ -190,7 +217,7 @@ def triangulate(soup: PolygonSoup) -> Triangulation:
         clipped, forced = _clip_ears(shape[of_chosen], normals[wrong], sizes[chosen])
         local[np.isin(polygon, chosen)] = clipped
         overlapping = chosen[forced]
-    return Triangulation(corners[first[polygon, None] + local], polygon, overlapping)
+    return Triangulation(first[polygon, None] + local, polygon, overlapping)
 
 
 def _relative_corners(soup: PolygonSoup, chosen: Integers, first: Integers) -> npt.NDArray[np.float64]:

@@ -13,7 +13,7 @@ import numpy.typing as npt
 from anisomesh._arrays import Points
 from anisomesh.errors import MeshFileError
 from anisomesh.io.atomic import atomic_path
-from anisomesh.io.formats.vtk_xml import vtu_bytes
+from anisomesh.io.formats.vtk.write import vtu_bytes
 
 N_COLOURS = 12  # colours of the palette; heuristic
 _HASH_MULTIPLIER = 2654435761  # near 2^32 / golden ratio: multiplicative hashing, Knuth, TAOCP vol. 3, section 6.4

@@ -7,11 +7,13 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
+from anisomesh.io.carried import Carried
 from anisomesh.io.cells import N_CORNERS, Shape, SurfaceCells, strip_triangles
 from anisomesh.io.polygons import Integers
 
-TRIANGLE, STRIP, POLYGON, PIXEL, QUAD, QUADRATIC_POLYGON = 5, 6, 7, 8, 9, 36
+VERTEX, LINE, TRIANGLE, STRIP, POLYGON, PIXEL, QUAD, QUADRATIC_POLYGON = 1, 3, 5, 6, 7, 8, 9, 36
 
+_POLY_VERTEX, _POLY_LINE, _QUADRATIC_EDGE = 2, 4, 21
 _N_TYPES = 256  # of one byte
 
 _VTK_SHAPES: dict[int, Shape] = {
@@ -69,6 +71,27 @@ def add_vtk_cells(
         else:
             nodes = connectivity[(ends[chosen] - size)[:, None] + np.arange(size)]
             _add_surface_cells(cells, cell_type, nodes, source[chosen])
+
+
+def add_vtk_lines(carried: Carried, types: npt.NDArray[Any], connectivity: Integers, offsets: npt.NDArray[Any]) -> None:
+    """Add the lines of a valid grid, and its vertices as fixed points; parameters as for :func:`add_vtk_cells`."""
+    types, ends = np.asarray(types, dtype=np.int64), np.asarray(offsets, dtype=np.int64)
+    sizes = np.diff(ends, prepend=0)
+    for cell_type, size in ((VERTEX, 1), (_POLY_VERTEX, 0), (LINE, 0), (_POLY_LINE, 0), (_QUADRATIC_EDGE, 3)):
+        chosen = np.flatnonzero((types == cell_type) & (sizes >= (size or 1)))
+        if len(chosen) == 0:
+            continue
+        if cell_type in (VERTEX, _POLY_VERTEX):
+            rows = np.repeat(ends[chosen] - sizes[chosen], sizes[chosen])
+            step = np.arange(len(rows)) - np.repeat(np.cumsum(sizes[chosen]) - sizes[chosen], sizes[chosen])
+            carried.fixed_points.append(connectivity[rows + step])
+        elif cell_type == _QUADRATIC_EDGE:
+            carried.lines.append(connectivity[(ends[chosen] - 3)[:, None] + np.arange(3)])
+        else:
+            owner = np.repeat(np.arange(len(ends)), sizes)
+            within = (owner[1:] == owner[:-1]) & (types[owner[1:]] == cell_type)
+            start = np.flatnonzero(within)
+            carried.lines.append(np.stack([connectivity[start], connectivity[start + 1]], axis=1))
 
 
 def _add_surface_cells(cells: SurfaceCells, cell_type: int, nodes: Integers, source: Integers) -> None:

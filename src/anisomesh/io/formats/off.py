@@ -6,13 +6,17 @@ import re
 
 import numpy as np
 
-from anisomesh._arrays import Faces, Points
-from anisomesh.io.formats.words import coordinates, format_rows, integers
+from anisomesh.attributes.model import Mesh
+from anisomesh.io.carried import COLOUR, NORMAL, UV, Array, Carried
+from anisomesh.io.formats.words import coordinates, integers
+from anisomesh.io.holding import Losses, continuous_corner_data
 from anisomesh.io.polygons import PolygonSoup
+
+_BYTE = 255
 
 
 def read_off(data: bytes) -> PolygonSoup:
-    """Read a text file in Object File Format (OFF, COFF, NOFF, CNOFF or STOFF); extra columns are ignored.
+    """Read a text file in Object File Format (OFF, COFF, NOFF, CNOFF or STOFF); with its colours.
 
     Notes
     -----
@@ -44,10 +48,78 @@ def read_off(data: bytes) -> PolygonSoup:
     if len(negative):
         raise ValueError(f"line {numbers[face_lines[negative[0]]] + 1} begins with {sizes[negative[0]]} corners")
     rows_of_corners = [row[1 : size + 1] for row, size in zip(tokens, sizes.tolist(), strict=True)]
-    return PolygonSoup(points=points, corners=integers(rows_of_corners, numbers[face_lines]), sizes=sizes)
+    corners = integers(rows_of_corners, numbers[face_lines])
+    colours = [row[size + 1 :] for row, size in zip(tokens, sizes.tolist(), strict=True)]
+    carried = _carried(head[0], lines[start : start + n_points], colours)
+    return PolygonSoup(points=points, corners=corners, sizes=sizes, carried=carried)
 
 
-def off_text(points: Points, faces: Faces) -> str:
-    """Return the content of an OFF file."""
-    head = f"OFF\n{len(points)} {len(faces)} 0\n"
-    return head + format_rows("%r %r %r\n", points) + format_rows("3 %d %d %d\n", faces)
+def _carried(head: bytes, vertices: list[bytes], colours: list[list[bytes]]) -> Carried:
+    """Return the columns behind the coordinates of points, in the order normal, colour, texture, and face colours."""
+    carried = Carried()
+    flags = re.match(rb"(ST)?(C)?(N)?OFF", head)
+    texture, colour, normal = flags.groups() if flags else (None, None, None)
+    if texture or colour or normal:
+        with carried.optional("the columns behind the coordinates of points"):
+            rows = [line.partition(b"#")[0].split()[3:] for line in vertices]
+            width = {len(row) for row in rows}
+            n_colours = max(width) - 3 * bool(normal) - 2 * bool(texture)
+            if len(width) > 1 or (n_colours not in (3, 4) if colour else n_colours != 0):
+                raise ValueError(f"lines of points have {min(width) + 3} to {max(width) + 3} numbers")
+            at = 0
+            for name, count in ((NORMAL, 3 * bool(normal)), (COLOUR, n_colours), (UV, 2 * bool(texture))):
+                part = [row[at : at + count] for row in rows]
+                at += count
+                if count:
+                    carried.point_data[name] = _colours(part) if name == COLOUR else np.array(part, dtype=np.float64)
+    widths = {len(row) for row in colours}
+    if widths & {1, 2, 3, 4}:
+        with carried.optional("the colours of faces"):
+            if widths not in ({3}, {4}):
+                raise ValueError(f"lines of faces have {min(widths)} to {max(widths)} numbers behind their corners")
+            carried.cell_data[COLOUR] = _colours(colours)
+    return carried
+
+
+def _colours(rows: list[list[bytes]]) -> Array:
+    """Return colours: bytes if they are integers up to 255, otherwise shares of 1."""
+    values = np.array(rows, dtype=np.float64)
+    is_whole = all(word.isdigit() for row in rows for word in row)
+    return values.astype(np.uint8) if is_whole and values.max() <= _BYTE else values
+
+
+def off_bytes(mesh: Mesh, losses: Losses) -> bytes:
+    """Return the content of an OFF file: points, with normals, colours and texture coordinates, and coloured faces."""
+    points, faces = mesh.surface.points, mesh.surface.faces
+    parts, pattern, head = [points], "%r %r %r", ""
+    point_data = {**mesh.point_data, **continuous_corner_data(mesh, losses)}
+    for name, letters, widths in ((NORMAL, "N", (3,)), (COLOUR, "C", (3, 4)), (UV, "ST", (2,))):
+        columns = _columns(point_data.get(name), widths)
+        if columns is not None:
+            parts.append(columns[0])
+            pattern, head = pattern + columns[1], letters + head
+            del point_data[name]
+    vertices = _lines(pattern + "\n", parts)
+    of_faces = _columns(mesh.face_data.get(COLOUR), (3, 4))
+    pattern = "3 %d %d %d" + ("" if of_faces is None else of_faces[1]) + "\n"
+    triangles = _lines(pattern, [faces] if of_faces is None else [faces, of_faces[0]])
+    losses.add("point data", *point_data)
+    losses.add("face data", *(name for name in mesh.face_data if name != COLOUR or of_faces is None))
+    losses.add("regions", *mesh.regions)
+    losses.add("materials", *mesh.materials)
+    losses.features(mesh)
+    return f"{head}OFF\n{len(points)} {len(faces)} 0\n{vertices}{triangles}".encode()
+
+
+def _columns(values: Array | None, widths: tuple[int, ...]) -> tuple[Array, str] | None:
+    """Return numbers (n, k) of a permitted width and their pattern, None for others."""
+    if values is None or values.ndim != 2 or values.shape[1] not in widths or values.dtype.kind not in "uf":
+        return None
+    if values.dtype.kind == "u":
+        return (values, " %d" * values.shape[1]) if values.dtype == np.uint8 else None
+    return values, " %r" * values.shape[1]
+
+
+def _lines(pattern: str, parts: list[Array]) -> str:
+    columns = [column for part in parts for column in part.T.tolist()]
+    return "".join(map(pattern.__mod__, zip(*columns, strict=True)))

@@ -7,16 +7,25 @@ import re
 
 import numpy as np
 
-from anisomesh._arrays import Faces, Points
-from anisomesh.io.formats.words import BYTE_ORDER_MARK
+from anisomesh._arrays import Points
+from anisomesh.attributes.model import Mesh, Regions
+from anisomesh.io.carried import Carried
+from anisomesh.io.formats.words import BYTE_ORDER_MARK, format_rows
+from anisomesh.io.holding import Losses, by_label, main_division, name_of
 from anisomesh.io.polygons import PolygonSoup
 from anisomesh.mesh.geometry import face_cross, unit
 from anisomesh.mesh.weld import coincident
 
 logger = logging.getLogger(__name__)
 
+SOLID, ATTRIBUTE = "solid", "attribute"
+"""Names of the division into solids, and of the two bytes per triangle as face data."""
+
 _HEADER_BYTES = 84  # of a binary file: 80 of text and the number of triangles
 _TEXT = re.compile(rb"\s*solid.*?\bfacet\s+normal\b", re.DOTALL | re.IGNORECASE)
+_FACET = re.compile(rb"\bfacet\s+normal\b", re.IGNORECASE)
+_SOLID = re.compile(rb"^[ \t]*solid\b([^\n]*)$", re.IGNORECASE | re.MULTILINE)
+_FACET_LINES = "facet normal %r %r %r\n outer loop\n" + 3 * "  vertex %r %r %r\n" + " endloop\nendfacet\n"
 _TRIANGLE = np.dtype([("normal", "<f4", 3), ("corners", "<f4", (3, 3)), ("attribute", "<u2")])
 
 
@@ -27,13 +36,17 @@ def read_stl(data: bytes) -> PolygonSoup:
     -----
     A file is text if it begins with "solid" and has a facet, unless its size fits its number of triangles: headers of
     binary files can begin with "solid" as well. Bytes behind the triangles of a binary file are left out, with a
-    remark, unless they are triangles that the file does not count.
+    remark, unless they are triangles that the file does not count. Solids of text are a division; the two bytes per
+    triangle of binary files are face data.
     """
     declared = int.from_bytes(data[80:84], "little") if len(data) >= _HEADER_BYTES else -1
     end = _HEADER_BYTES + declared * _TRIANGLE.itemsize
     remarks: list[str] = []
+    carried = Carried()
     if len(data) != end and _TEXT.match(data.removeprefix(BYTE_ORDER_MARK)):
         corners = _text_corners(data.lower(), remarks)
+        with carried.optional("its solids"):
+            _take_solids(data, carried)
     elif declared < 0:
         raise ValueError(f"truncated: {len(data)} bytes; a binary STL file has at least {_HEADER_BYTES}")
     elif len(data) < end or (data[end:].strip(b"\0") and (len(data) - end) % _TRIANGLE.itemsize == 0):
@@ -45,20 +58,22 @@ def read_stl(data: bytes) -> PolygonSoup:
             remarks.append(f"left out {len(data) - end} byte(s) behind the {declared} triangles that it declares")
         rows = np.frombuffer(data, dtype=_TRIANGLE, offset=_HEADER_BYTES, count=declared)
         corners = rows["corners"].astype(np.float64).reshape(-1, 3)
+        if rows["attribute"].any():
+            carried.cell_data[ATTRIBUTE] = rows["attribute"].copy()
     points, inverse = np.unique(coincident(corners), return_inverse=True)
     logger.info("STL stores no connectivity: welded %d corners into %d points", len(corners), len(points))
-    return PolygonSoup.from_array(corners[points], inverse.reshape(-1, 3), remarks=remarks)
+    return PolygonSoup.from_array(corners[points], inverse.reshape(-1, 3), remarks=remarks, carried=carried)
 
 
-def stl_bytes(points: Points, faces: Faces) -> bytes:
-    """Return the content of a binary STL file; coordinates are rounded to float32."""
-    rows = np.zeros(len(faces), dtype=_TRIANGLE)
-    with np.errstate(over="ignore"):
-        rows["corners"] = points[faces]
-    if not np.isfinite(rows["corners"]).all():
-        raise ValueError("coordinates beyond 3.4e38 do not fit the float32 of STL; use PLY instead")
-    rows["normal"] = unit(face_cross(points, faces))
-    return b"binary STL".ljust(_HEADER_BYTES - 4) + len(faces).to_bytes(4, "little") + rows.tobytes()
+def _take_solids(data: bytes, carried: Carried) -> None:
+    """Add the solids, numbered from 1, if there are several or one has a name."""
+    solids = list(_SOLID.finditer(data))
+    texts = [" ".join(match[1].decode("utf-8", errors="replace").split()) for match in solids]
+    names = {k + 1: text for k, text in enumerate(texts) if text}
+    facets = np.array([match.start() for match in _FACET.finditer(data)])
+    labels = np.searchsorted(np.array([match.start() for match in solids]), facets)
+    if names or len(solids) > 1:
+        carried.add_cell_data(SOLID, labels, names=names)
 
 
 def _text_corners(text: bytes, remarks: list[str]) -> Points:
@@ -73,3 +88,46 @@ def _text_corners(text: bytes, remarks: list[str]) -> Points:
     if not has_end:
         remarks.append(f"it has no endsolid after its {n_facets} facets; check that none is missing")
     return np.array([list(map(float, row)) for row in found], dtype=np.float64).reshape(-1, 3)
+
+
+def stl_bytes(mesh: Mesh, losses: Losses) -> bytes:
+    """Return the content of an STL file.
+
+    Notes
+    -----
+    A mesh with regions becomes a text file with a solid for each region of one division, in float64. Without regions it
+    becomes a binary file, in float32.
+    """
+    points, faces = mesh.surface.points, mesh.surface.faces
+    found = main_division(mesh.regions, SOLID)
+    attribute = mesh.face_data.get(ATTRIBUTE)
+    is_held = found is None and attribute is not None and attribute.ndim == 1 and attribute.dtype == np.uint16
+    losses.add("point data", *mesh.point_data)
+    losses.add("face data", *(name for name in mesh.face_data if name != ATTRIBUTE or not is_held))
+    losses.add("corner data", *mesh.corner_data)
+    losses.add("regions", *(name for name in mesh.regions if found is None or name != found[0]))
+    losses.add("materials", *mesh.materials)
+    losses.features(mesh)
+    if found is not None:
+        return _text(mesh, found[1]).encode("utf-8", errors="replace")
+    rows = np.zeros(len(faces), dtype=_TRIANGLE)
+    with np.errstate(over="ignore"):
+        rows["corners"] = points[faces]
+    if not np.isfinite(rows["corners"]).all():
+        raise ValueError("coordinates beyond 3.4e38 do not fit the float32 of STL; use PLY instead")
+    rows["normal"] = unit(face_cross(points, faces))
+    if is_held and attribute is not None:
+        rows["attribute"] = attribute
+    return b"binary STL".ljust(_HEADER_BYTES - 4) + len(faces).to_bytes(4, "little") + rows.tobytes()
+
+
+def _text(mesh: Mesh, solids: Regions) -> str:
+    """Return a text file with a solid for each region, in the order of their labels."""
+    points, faces = mesh.surface.points, mesh.surface.faces
+    table = np.concatenate([unit(face_cross(points, faces)), points[faces].reshape(-1, 9)], axis=1)
+    parts = []
+    for (label,), chosen in by_label(solids.labels):
+        name = name_of(solids, label)
+        rows = format_rows(_FACET_LINES, table[chosen])
+        parts.append(f"solid {name}\n{rows}endsolid {name}\n")
+    return "".join(parts)

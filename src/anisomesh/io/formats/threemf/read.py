@@ -10,32 +10,36 @@ import re
 import zipfile
 from array import array
 from dataclasses import dataclass, field
-from typing import Any
 from xml.parsers import expat
 
 import numpy as np
 import numpy.typing as npt
 
-from anisomesh._arrays import Faces, Points
+from anisomesh.io.carried import Carried
 from anisomesh.io.cells import SurfaceCells
-from anisomesh.io.formats.words import format_rows
+from anisomesh.io.formats.threemf.properties import NONE, Properties, number
 from anisomesh.io.polygons import Integers, PolygonSoup
 
-_ROOT = "3D/3dmodel.model"
-_MODEL_TYPE = "http://schemas.microsoft.com/3dmanufacturing/2013/01/3dmodel"
-_CORE = "http://schemas.microsoft.com/3dmanufacturing/core/2015/02"
+ROOT = "3D/3dmodel.model"
+MODEL_TYPE = "http://schemas.microsoft.com/3dmanufacturing/2013/01/3dmodel"
+CORE = "http://schemas.microsoft.com/3dmanufacturing/core/2015/02"
+MATERIALS = "http://schemas.microsoft.com/3dmanufacturing/material/2015/02"
+_SHAPES = {"beamlattice", "booleanshape", "levelset"}
+_LEFT_OUT = {"texture2d", "compositematerials", "multiproperties"}
 _DEEPEST_COMPONENTS = 100
 _MAX_OBJECTS = 100_000
 _LARGEST_SHARE = 1_100  # uncompressed bytes per byte of an entry; zlib reaches 1,032
-_DATE = (1980, 1, 1, 0, 0, 0)  # of all entries, so that the same mesh gives the same file
 
 
 @dataclass
 class _Object:
     """An object of a model: a mesh, or copies of other objects."""
 
+    name: str = ""
     points: array[float] = field(default_factory=lambda: array("d"))
     faces: array[int] = field(default_factory=lambda: array("q"))
+    properties: array[int] = field(default_factory=lambda: array("q"))  # group and three members, of each triangle
+    default: tuple[int, int] = (NONE, NONE)  # group and member of triangles without
     components: list[tuple[tuple[str, str], str]] = field(default_factory=list)
 
 
@@ -46,6 +50,9 @@ class _Model:
     objects: dict[str, _Object] = field(default_factory=dict)
     items: list[tuple[tuple[str, str], str]] = field(default_factory=list)
     ignored: set[str] = field(default_factory=set)
+    groups: dict[int, list[tuple[str, str]]] = field(default_factory=dict)  # of materials: names, colours
+    colours: dict[int, list[str]] = field(default_factory=dict)  # of colours without names
+    unit: str = "millimeter"
 
 
 def read_3mf(data: bytes) -> PolygonSoup:
@@ -57,11 +64,11 @@ def read_3mf(data: bytes) -> PolygonSoup:
     with archive:
         build = _Build(archive)
         root = build.model(_root_name(archive))
-        items = root.items or [(("", number), "") for number in root.objects]
-        for (path, number), transform in items:
-            build.add((path or build.root, number), _matrix(transform), 0)
-        remarks = tuple(f"left out its {name}, which are not triangles" for name in sorted(build.ignored))
-        return build.cells.soup(np.concatenate(build.points), remarks)
+        items = root.items or [(("", other), "") for other in root.objects]
+        for (path, other), transform in items:
+            build.add((path or build.root, other), _matrix(transform), 0)
+        remarks = tuple(f"left out its {name}, which are not triangles" for name in sorted(build.ignored & _SHAPES))
+        return build.cells.soup(np.concatenate(build.points), remarks, build.carry())
 
 
 class _Build:
@@ -75,6 +82,7 @@ class _Build:
         self.points: list[npt.NDArray[np.float64]] = [np.zeros((0, 3))]
         self.ignored: set[str] = set()
         self._n_points = self._n_instances = 0
+        self._properties = Properties()
 
     def model(self, name: str) -> _Model:
         """Return a part of the archive; ValueError if it is missing or malformed."""
@@ -93,19 +101,34 @@ class _Build:
         found = self.model(key[0]).objects.get(key[1])
         if found is None:
             raise ValueError(f"truncated or malformed: it has no object {key[1]!r} in {key[0]}")
-        for (path, number), transform in found.components:
-            self.add((path or key[0], number), _product(_matrix(transform), matrix), depth + 1)
+        for (path, other), transform in found.components:
+            self.add((path or key[0], other), _product(_matrix(transform), matrix), depth + 1)
         if found.faces:
             points = np.array(found.points, dtype=np.float64).reshape(-1, 3)
             faces: Integers = np.array(found.faces, dtype=np.int64).reshape(-1, 3)
             if faces.min() < 0 or faces.max() >= len(points):
                 raise ValueError(f"a triangle of object {key[1]} refers to a point beyond its {len(points)} points")
-            if np.linalg.det(matrix[:3]) < 0.0:
+            given = np.array(found.properties, dtype=np.int64).reshape(-1, 4)
+            is_reflected = bool(np.linalg.det(matrix[:3]) < 0.0)
+            self._properties.add(found.name, given, found.default, self.model(key[0]), turned=is_reflected)
+            if is_reflected:
                 faces = faces[:, ::-1]  # a reflection turns triangles inside out
             self.cells.add("triangle", faces + self._n_points)
             moved = points if (matrix == np.eye(4, 3)).all() else points @ matrix[:3] + matrix[3]
             self.points.append(moved)
             self._n_points += len(points)
+
+    def carry(self) -> Carried:
+        """Return everything besides triangles."""
+        carried = Carried()
+        self._properties.carry(carried)
+        unit = self.model(self.root).unit
+        if unit != "millimeter":
+            carried.materials["unit"] = unit
+        others = sorted(self.ignored - _SHAPES)
+        if others:
+            carried.remarks.append(f"left out its {', '.join(others)}")
+        return carried
 
 
 def _root_name(archive: zipfile.ZipFile) -> str:
@@ -113,9 +136,9 @@ def _root_name(archive: zipfile.ZipFile) -> str:
     if "_rels/.rels" in archive.namelist():
         for element in re.findall(rb"<[\w:]*Relationship\s[^>]*>", _entry(archive, "_rels/.rels")):
             target = re.search(rb"Target\s*=\s*[\"']([^\"']+)", element)
-            if target and _MODEL_TYPE.encode() in element:
+            if target and MODEL_TYPE.encode() in element:
                 return target[1].decode(errors="replace").lstrip("/")
-    return _ROOT
+    return ROOT
 
 
 def _entry(archive: zipfile.ZipFile, name: str) -> bytes:
@@ -129,22 +152,38 @@ def _entry(archive: zipfile.ZipFile, name: str) -> bytes:
 
 
 def _parse_model(text: bytes, name: str) -> _Model:
-    model = _Model()
-    current = _Object()
+    model, current, group = _Model(), _Object(), NONE
 
     def start(tag: str, attributes: dict[str, str]) -> None:
-        nonlocal current
+        nonlocal current, group
         namespace, _, local = tag.rpartition(" ")
-        if namespace != _CORE:
-            if local in ("beamlattice", "booleanshape", "levelset"):
+        if namespace == MATERIALS:
+            if local == "colorgroup":
+                group = number(attributes.get("id", ""))
+                model.colours[group] = []
+            elif local == "color" and group in model.colours:
+                model.colours[group].append(attributes.get("color", ""))
+            elif local in _LEFT_OUT:
                 model.ignored.add(local)
-            return
-        if local == "vertex":
+        elif namespace != CORE:
+            if local in _SHAPES:
+                model.ignored.add(local)
+        elif local == "vertex":
             current.points.extend((float(attributes["x"]), float(attributes["y"]), float(attributes["z"])))
         elif local == "triangle":
             current.faces.extend((int(attributes["v1"]), int(attributes["v2"]), int(attributes["v3"])))
+            current.properties.extend(number(attributes.get(key, "")) for key in ("pid", "p1", "p2", "p3"))
         elif local == "object":
             current = model.objects.setdefault(attributes["id"], _Object())
+            current.name = attributes.get("name", "")
+            current.default = (number(attributes.get("pid", "")), number(attributes.get("pindex", "")))
+        elif local == "model":
+            model.unit = attributes.get("unit", model.unit)
+        elif local == "basematerials":
+            group = number(attributes.get("id", ""))
+            model.groups[group] = []
+        elif local == "base" and group in model.groups:
+            model.groups[group].append((attributes.get("name", ""), attributes.get("displaycolor", "")))
         elif local in ("component", "item"):
             path = next((value for key, value in attributes.items() if key.endswith(" path")), "")
             placed = (path, attributes["objectid"]), attributes.get("transform", "")
@@ -175,30 +214,3 @@ def _product(first: npt.NDArray[np.float64], then: npt.NDArray[np.float64]) -> n
     product: npt.NDArray[np.float64] = first @ then[:3]
     product[3] += then[3]
     return product
-
-
-def threemf_bytes(points: Points, faces: Faces) -> bytes:
-    """Return the content of a 3MF archive of one object, in millimetres, in float64."""
-    vertices = format_rows('<vertex x="%r" y="%r" z="%r"/>\n', points)
-    triangles = format_rows('<triangle v1="%d" v2="%d" v3="%d"/>\n', faces)
-    head = '<?xml version="1.0" encoding="UTF-8"?>\n'
-    mesh = f"<mesh><vertices>\n{vertices}</vertices><triangles>\n{triangles}</triangles></mesh>"
-    model = (
-        f'{head}<model unit="millimeter" xmlns="{_CORE}">\n<resources><object id="1" type="model">{mesh}</object>'
-        '</resources><build><item objectid="1"/></build></model>\n'
-    )
-    types = "http://schemas.openxmlformats.org/package/2006/content-types"
-    relationships = "http://schemas.openxmlformats.org/package/2006/relationships"
-    entries: dict[str, Any] = {
-        "[Content_Types].xml": f'{head}<Types xmlns="{types}">'
-        '<Default Extension="rels" ContentType="application/vnd.openxmlformats-package.relationships+xml"/>'
-        '<Default Extension="model" ContentType="application/vnd.ms-package.3dmanufacturing-3dmodel+xml"/></Types>\n',
-        "_rels/.rels": f'{head}<Relationships xmlns="{relationships}">'
-        f'<Relationship Target="/{_ROOT}" Id="rel0" Type="{_MODEL_TYPE}"/></Relationships>\n',
-        _ROOT: model,
-    }
-    buffer = io.BytesIO()
-    with zipfile.ZipFile(buffer, "w", zipfile.ZIP_DEFLATED) as archive:
-        for name, text in entries.items():
-            archive.writestr(zipfile.ZipInfo(name, _DATE), text, zipfile.ZIP_DEFLATED)
-    return buffer.getvalue()

@@ -6,59 +6,95 @@ Format: https://docs.vtk.org/en/latest/vtk_file_formats/vtkxml_file_format.html.
 from __future__ import annotations
 
 import re
-from collections.abc import Mapping
 from typing import Any
 from xml.etree import ElementTree
-from xml.sax.saxutils import quoteattr
 
 import numpy as np
 import numpy.typing as npt
 
-from anisomesh._arrays import Points
+from anisomesh.io.carried import Carried
 from anisomesh.io.cells import SurfaceCells
-from anisomesh.io.formats.vtk_arrays import ArrayReader, packed_array, type_name
+from anisomesh.io.formats.vtk.arrays import ArrayReader
+from anisomesh.io.formats.vtk.data import PieceData, names_by_meaning, read_field_data
 from anisomesh.io.polygons import Integers, PolygonSoup
-from anisomesh.io.vtk_cells import POLYGON, QUAD, STRIP, TRIANGLE, add_vtk_cells
-
-Data = Mapping[str, npt.NDArray[Any]]
+from anisomesh.io.vtk_cells import LINE, POLYGON, STRIP, VERTEX, add_vtk_cells, add_vtk_lines
 
 _ORDERS = {"LittleEndian": "<", "BigEndian": ">"}
 _HEADERS = {"UInt32": "u4", "UInt64": "u8"}
-_CELL_TYPES = {3: TRIANGLE, 4: QUAD}  # by number of corners; others are polygons
 
 
 def read_vtu(data: bytes) -> PolygonSoup:
-    """Read the surface cells of all pieces of a VTK unstructured grid."""
-    root, arrays = _parse(data, "UnstructuredGrid")
-    cells, points = SurfaceCells(), _Points()
-    for piece in root.iterfind("UnstructuredGrid/Piece"):
-        first = points.add(piece, arrays)
+    """Read the surface cells of all pieces of a VTK unstructured grid, and their data.
+
+    Notes
+    -----
+    Lines are features, vertices are fixed points.
+    """
+    file = _File(data, "UnstructuredGrid")
+    for piece in file.pieces():
+        first = file.points.add(piece, file.arrays)
         types, connectivity, offsets = (
-            _array(piece, "Cells", name, arrays) for name in ("types", "connectivity", "offsets")
+            _array(piece, "Cells", name, file.arrays) for name in ("types", "connectivity", "offsets")
         )
         declared = piece.get("NumberOfCells", "")
         if declared != str(len(types)):
             raise ValueError(f"truncated or malformed: a piece declares {declared!r} cells but has {len(types)}")
-        add_vtk_cells(cells, types, _shifted(connectivity, points, first), offsets)
-    return cells.soup(points.all())
+        connectivity = _shifted(connectivity, file.points, first)
+        add_vtk_cells(file.cells, types, connectivity, offsets)
+        add_vtk_lines(file.carried, types, connectivity, offsets)
+        file.add_data(piece, file.points.count - first, len(types))
+    return file.soup()
 
 
 def read_vtp(data: bytes) -> PolygonSoup:
-    """Read the polygons and strips of all pieces of VTK polygon data."""
-    root, arrays = _parse(data, "PolyData")
-    cells, points = SurfaceCells(), _Points()
-    for piece in root.iterfind("PolyData/Piece"):
-        first = points.add(piece, arrays)
-        for section, cell_type in (("Verts", 1), ("Lines", 3), ("Strips", STRIP), ("Polys", POLYGON)):
+    """Read the polygons and strips of all pieces of VTK polygon data, as :func:`read_vtu` does."""
+    file = _File(data, "PolyData")
+    for piece in file.pieces():
+        first, n_cells = file.points.add(piece, file.arrays), 0
+        for section, cell_type in (("Verts", VERTEX), ("Lines", LINE), ("Polys", POLYGON), ("Strips", STRIP)):
             declared = piece.get(f"NumberOf{section}", "0")
             if declared == "0":
                 continue
-            connectivity, offsets = (_array(piece, section, name, arrays) for name in ("connectivity", "offsets"))
+            connectivity, offsets = (_array(piece, section, name, file.arrays) for name in ("connectivity", "offsets"))
             if declared != str(len(offsets)):
                 raise ValueError(f"truncated or malformed: {section} declares {declared!r} cells, has {len(offsets)}")
-            types = np.full(len(offsets), cell_type)
-            add_vtk_cells(cells, types, _shifted(connectivity, points, first), offsets)
-    return cells.soup(points.all())
+            types, connectivity = np.full(len(offsets), cell_type), _shifted(connectivity, file.points, first)
+            add_vtk_cells(file.cells, types, connectivity, offsets)
+            add_vtk_lines(file.carried, types, connectivity, offsets)
+            n_cells += len(offsets)
+        file.add_data(piece, file.points.count - first, n_cells)
+    return file.soup()
+
+
+class _File:
+    """A file with the points, cells and data of its pieces."""
+
+    def __init__(self, data: bytes, kind: str) -> None:
+        self._root, self.arrays = _parse(data, kind)
+        self._kind = kind
+        self.points, self.cells, self.carried = _Points(), SurfaceCells(), Carried()
+        self._point_data, self._cell_data = PieceData("PointData"), PieceData("CellData")
+        self._ours: dict[str, str] = {}
+
+    def pieces(self) -> list[ElementTree.Element]:
+        """Return the pieces."""
+        return self._root.findall(f"{self._kind}/Piece")
+
+    def add_data(self, piece: ElementTree.Element, n_points: int, n_cells: int) -> None:
+        """Add the data of a piece with these numbers of points and cells."""
+        self._point_data.add(piece, self.arrays, n_points, self.carried)
+        self._cell_data.add(piece, self.arrays, n_cells, self.carried)
+        self._ours |= names_by_meaning(piece)
+
+    def soup(self) -> PolygonSoup:
+        """Return everything."""
+        carried = self.carried
+        names = read_field_data(self._root, self._kind, self.arrays, carried)
+        for name, values in self._point_data.all(carried).items():
+            carried.point_data[self._ours.get(name, name)] = values
+        for name, values in self._cell_data.all(carried).items():
+            carried.add_cell_data(name, values, names=names.get(name))
+        return self.cells.soup(self.points.all(), carried=carried)
 
 
 class _Points:
@@ -118,7 +154,7 @@ def _parse(data: bytes, kind: str) -> tuple[ElementTree.Element, ArrayReader]:
     order, header = root.get("byte_order", "LittleEndian"), root.get("header_type", "UInt32")
     if order not in _ORDERS or header not in _HEADERS:
         raise ValueError(f"malformed: its byte order is {order!r} and its headers are {header!r}")
-    offsets = sorted(int(text) for array in root.iter("DataArray") if (text := array.get("offset", "")).isdigit())
+    offsets = sorted(int(text) for array in root.iter() if (text := array.get("offset", "")).isdigit())
     return root, ArrayReader(
         order=_ORDERS[order],
         header=np.dtype(_ORDERS[order] + _HEADERS[header]),
@@ -140,61 +176,3 @@ def _array(piece: ElementTree.Element, section: str, name: str, arrays: ArrayRea
     if piece.get("NumberOfCells") == "0":
         return np.zeros(0, dtype=np.int64)
     raise ValueError(f"truncated or malformed: a piece has no array {name!r} in {section}")
-
-
-def vtu_bytes(
-    points: Points, corners: npt.NDArray[Any], sizes: Integers, point_data: Data, cell_data: Data | None = None
-) -> bytes:
-    """Return the content of a compressed VTK unstructured grid.
-
-    Parameters
-    ----------
-    points
-        Coordinates (V, 3).
-    corners, sizes
-        Point indices of all polygons, concatenated, and the number of corners of each (P,).
-    point_data, cell_data
-        Arrays (V,) or (V, k) and (P,) or (P, k) by name.
-    """
-    types = np.full(len(sizes), POLYGON, dtype=np.uint8)
-    for size, cell_type in _CELL_TYPES.items():
-        types[sizes == size] = cell_type
-    arrays: Data = {"connectivity": _indices(corners), "offsets": np.cumsum(sizes), "types": types}
-    counts = f'NumberOfCells="{len(sizes)}"'
-    return _file("UnstructuredGrid", points, counts, "Cells", arrays, (point_data, cell_data or {}))
-
-
-def vtp_bytes(points: Points, corners: npt.NDArray[Any], sizes: Integers, point_data: Data) -> bytes:
-    """Return the content of compressed VTK polygon data; parameters as for :func:`vtu_bytes`."""
-    arrays = {"connectivity": _indices(corners), "offsets": np.cumsum(sizes)}
-    counts = f'NumberOfVerts="0" NumberOfLines="0" NumberOfStrips="0" NumberOfPolys="{len(sizes)}"'
-    return _file("PolyData", points, counts, "Polys", arrays, (point_data, {}))
-
-
-def _indices(corners: npt.NDArray[Any]) -> npt.NDArray[np.int64]:
-    return np.asarray(corners, dtype=np.int64).ravel()
-
-
-def _file(kind: str, points: Points, counts: str, section: str, cells: Data, data: tuple[Data, Data]) -> bytes:
-    head = f'type="{kind}" version="1.0" byte_order="LittleEndian" header_type="UInt64"'
-    return "\n".join(
-        [
-            '<?xml version="1.0"?>',
-            f'<VTKFile {head} compressor="vtkZLibDataCompressor">',
-            f'<{kind}><Piece NumberOfPoints="{len(points)}" {counts}>',
-            _section("Points", {"Points": np.asarray(points, dtype=np.float64)}),
-            _section(section, cells),
-            _section("PointData", data[0]),
-            _section("CellData", data[1]),
-            f"</Piece></{kind}></VTKFile>\n",
-        ]
-    ).encode()
-
-
-def _section(name: str, arrays: Data) -> str:
-    lines = []
-    for key, values in arrays.items():
-        width = "" if values.ndim == 1 else f' NumberOfComponents="{values.shape[1]}"'
-        head = f'<DataArray type="{type_name(values)}" Name={quoteattr(key)} format="binary"{width}>'
-        lines.append(f"{head}\n{packed_array(values)}\n</DataArray>")
-    return "\n".join([f"<{name}>", *lines, f"</{name}>"])

@@ -79,6 +79,6 @@ class NumberStream:
         if not self.binary:
             table = self.take((1 + width) * count, "<f8").reshape(count, 1 + width)
             return whole(table[:, 0]), table[:, 1:]
-        dtype = np.dtype([("tag", self._order + "i4"), ("xyz", self._order + "f8", width)])
+        dtype = np.dtype([("tag", self._order + "i4"), ("xyz", self._order + "f8", (width,))])
         rows = self.take(count * dtype.itemsize, "<i1").view(dtype)
         return rows["tag"].astype(np.int64), rows["xyz"].astype(np.float64)

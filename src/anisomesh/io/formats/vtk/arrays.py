@@ -97,7 +97,7 @@ class ArrayReader:
     offsets: list[int] = field(default_factory=list)
 
     def read(self, element: Element) -> npt.NDArray[Any]:
-        """Return the numbers of a DataArray, flat.
+        """Return the numbers or strings of an array, flat.
 
         Raises
         ------
@@ -105,8 +105,13 @@ class ArrayReader:
             If the type, the format or the compressor is unknown, or data are missing.
         """
         name, kind = element.get("Name", "without a name"), element.get("type", "")
+        if kind == "String":
+            return _strings(self._numbers(element, name, "UInt8"))
         if kind not in _TYPES:
             raise ValueError(f"the array {name} is of type {kind!r}; expected one of {', '.join(_TYPES)}")
+        return self._numbers(element, name, kind)
+
+    def _numbers(self, element: Element, name: str, kind: str) -> npt.NDArray[Any]:
         match element.get("format", "ascii"):
             case "ascii":
                 parse = float if kind.startswith("Float") else int
@@ -156,6 +161,19 @@ class ArrayReader:
             raise ValueError(f"truncated: the array {name} has a header of {count} numbers in {len(data)} bytes")
         numbers: list[int] = np.frombuffer(data, dtype=self.header, count=count).tolist()
         return numbers
+
+
+def _strings(codes: npt.NDArray[Any]) -> npt.NDArray[Any]:
+    """Return strings of UTF-8, each ended by a zero."""
+    words = codes.astype(np.uint8).tobytes().split(b"\0")
+    if words[-1]:
+        raise ValueError("truncated: its last string does not end")
+    return np.array([word.decode("utf-8", errors="replace") for word in words[:-1]], dtype=np.str_)
+
+
+def string_codes(words: npt.NDArray[Any]) -> npt.NDArray[np.uint8]:
+    """Return strings as bytes of UTF-8, each ended by a zero."""
+    return np.frombuffer(b"".join(str(word).encode().replace(b"\0", b" ") + b"\0" for word in words.ravel()), np.uint8)
 
 
 def _from_base64(text: bytes) -> bytes:

@@ -1,0 +1,135 @@
+"""What a file carries besides points and polygons, as readers find it."""
+
+from __future__ import annotations
+
+import lzma
+import re
+import zlib
+from collections.abc import Iterator
+from contextlib import contextmanager
+from dataclasses import dataclass, field
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+
+Array = npt.NDArray[Any]
+Integers = npt.NDArray[np.int64]
+
+UV, NORMAL, COLOUR = "uv", "normal", "color"
+"""Names of texture coordinates, unit normals and colours, whatever a format calls them."""
+
+_BROKEN = (
+    ValueError,
+    LookupError,
+    TypeError,
+    AttributeError,
+    OverflowError,
+    RecursionError,
+    zlib.error,
+    lzma.LZMAError,
+)  # what malformed data make readers raise
+_FEW_REGIONS, _FACES_PER_REGION = (
+    8,
+    2,
+)  # of integers that are regions by name: if more, with so many faces each; heuristic
+_REGION = re.compile(
+    r"(gmsh:)?(physical|geometrical)|medit:ref|reference|(domain|part|zone|block|region|material|group|object|solid)s?"
+    r"|(cell_?entity|model_?face|domain|part|zone|block|region|material|group|object|face|boundary)_?(ids?|tags?|labels?)",
+    re.IGNORECASE,
+)
+
+
+@dataclass(kw_only=True, eq=False)
+class Division:
+    """A division of the cells of a file into regions: labels (n,), and names of labels."""
+
+    labels: Integers
+    names: dict[int, str] = field(default_factory=dict)
+
+
+@dataclass(kw_only=True, eq=False)
+class Carried:
+    """What a file carries besides points and polygons, not validated.
+
+    Attributes
+    ----------
+    point_data, cell_data, corner_data
+        Arrays by name, with a row for each point, each face or cell of the file, or each corner of the polygons.
+    divisions
+        Divisions of the faces or cells of the file by name.
+    lines
+        Arrays of points, (n, 2) of straight lines or (n, 3) of lines of second order with the node in the middle last.
+    fixed_points
+        Points (n,).
+    materials
+        Whatever belongs to the file as a whole.
+    remarks
+        What was left out, a line each.
+    """
+
+    point_data: dict[str, Array] = field(default_factory=dict)
+    cell_data: dict[str, Array] = field(default_factory=dict)
+    corner_data: dict[str, Array] = field(default_factory=dict)
+    divisions: dict[str, Division] = field(default_factory=dict)
+    lines: list[Integers] = field(default_factory=list)
+    fixed_points: list[Integers] = field(default_factory=list)
+    materials: dict[str, Any] = field(default_factory=dict)
+    remarks: list[str] = field(default_factory=list)
+
+    @contextmanager
+    def optional(self, what: str) -> Iterator[None]:
+        """Leave out, with a remark, what cannot be read in a block, so that the geometry survives it."""
+        try:
+            yield
+        except _BROKEN as error:
+            reason = str(error) if type(error) is ValueError else f"{type(error).__name__}: {error}"
+            self.remarks.append(" ".join(f"left out {what}: {reason}".split()))
+
+    def add_cell_data(self, name: str, values: Array, *, names: dict[int, str] | None = None) -> None:
+        """Add cell data: a division if its labels have names or it is called as divisions usually are."""
+        is_label = values.ndim == 1 and values.dtype.kind in "iu"
+        most = max(_FEW_REGIONS, len(values) // _FACES_PER_REGION)
+        by_name = is_label and is_region(name) and len(np.unique(values)) <= most
+        if is_label and (names is not None or by_name):
+            self.divisions[name] = Division(labels=values.astype(np.int64), names=names or {})
+        else:
+            self.cell_data[name] = values
+
+    def take_corners(self, rows: Array) -> None:
+        """Take rows of the corner data, given by their numbers or a mask."""
+        for name, values in list(self.corner_data.items()):
+            with self.optional(f"corner data {name!r}"):
+                self.corner_data[name] = values[rows]
+
+
+def is_region(name: str) -> bool:
+    """Return whether cell data of integers with this name are usually regions."""
+    return _REGION.fullmatch(name) is not None
+
+
+def grouped_columns(columns: dict[str, Array]) -> dict[str, Array]:
+    """Return scalars (n,) by name with runs ``a_0``, ``a_1``, ... as one array ``a`` (n, k)."""
+    grouped: dict[str, Array] = {}
+    for name, values in columns.items():
+        base, _, number = name.rpartition("_")
+        if base and number.isdigit() and base not in columns:
+            width = next(k for k in range(len(columns) + 1) if f"{base}_{k}" not in columns)
+            parts = [columns[f"{base}_{k}"] for k in range(width)]
+            if width > 1 and len({part.dtype for part in parts}) == 1 and int(number) < width:
+                grouped.setdefault(base, np.stack(parts, axis=1))
+                continue
+        grouped[name] = values
+    return grouped
+
+
+def separate_columns(data: dict[str, Array]) -> dict[str, Array]:
+    """Return arrays (n, k) as scalars (n,) with the names ``a_0``, ``a_1``, ...."""
+    columns: dict[str, Array] = {}
+    for name, values in data.items():
+        if values.ndim == 1:
+            columns[name] = values
+        else:
+            rows = values.reshape(len(values), -1)
+            columns |= {f"{name}_{k}": rows[:, k] for k in range(rows.shape[1])}
+    return columns

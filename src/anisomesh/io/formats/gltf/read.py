@@ -1,0 +1,172 @@
+"""Reading of binary glTF 2.0 (GLB).
+
+Format: https://registry.khronos.org/glTF/specs/2.0/glTF-2.0.html.
+"""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+
+from anisomesh.io.carried import Carried
+from anisomesh.io.cells import SurfaceCells, strip_triangles
+from anisomesh.io.formats.gltf.attributes import Attributes, read_attributes
+from anisomesh.io.formats.gltf.document import Document, index_of
+from anisomesh.io.formats.gltf.materials import read_materials
+from anisomesh.io.polygons import Integers, PolygonSoup
+
+NODE, MATERIAL = "node", "material"
+"""Names of the divisions into the nodes of the scene and into materials."""
+
+TRIANGLES, _STRIP, _FAN = 4, 5, 6  # modes of a primitive; lower ones are points and lines
+_COPIES = "EXT_mesh_gpu_instancing"
+_DEEPEST = 200  # of nodes in nodes
+_MAX_INSTANCES = 100_000
+_NOT_KEPT = ("animations", "skins", "cameras")
+
+
+def read_glb(data: bytes) -> PolygonSoup:
+    """Read the triangles, strips and fans of all meshes of a binary glTF scene, moved by the nodes they hang on.
+
+    Notes
+    -----
+    Nodes and materials are divisions; texture coordinates, colours, normals and others are point data, since points are
+    repeated along seams. Texture coordinates have their origin at the lower left, as in OBJ.
+    """
+    return _Scene(Document(data)).soup()
+
+
+class _Scene:
+    """A glTF document, and the meshes found in it so far."""
+
+    def __init__(self, document: Document) -> None:
+        self._document = document
+        self._json = document.json
+        self._cells = SurfaceCells()
+        self._points: list[npt.NDArray[np.float64]] = [np.zeros((0, 3))]
+        self._n_points = 0
+        self._n_instances = 0
+        self._carried = Carried()
+        self._attributes = Attributes()
+        self._known: dict[Any, int] = {}  # first point of vertices that several primitives share
+        self._nodes: list[Integers] = [np.zeros(0, dtype=np.int64)]
+        self._materials: list[Integers] = [np.zeros(0, dtype=np.int64)]
+
+    def soup(self) -> PolygonSoup:
+        """Return the meshes of the scene, or all meshes if there is no scene."""
+        scenes = self._json.get("scenes", [])
+        if scenes:
+            for node in scenes[self._json.get("scene", 0)].get("nodes", []):
+                self._add_node(node, np.eye(4), 0)
+        else:
+            for mesh in range(len(self._json.get("meshes", []))):
+                self._add_mesh(mesh, np.eye(4), mesh)
+        used = _COPIES in self._json.get("extensionsUsed", [])
+        remarks = (f"left out copies of its meshes that {_COPIES} makes",) if used else ()
+        self._carry()
+        return self._cells.soup(np.concatenate(self._points), remarks, self._carried)
+
+    def _carry(self) -> None:
+        """Collect everything besides triangles."""
+        carried = self._carried
+        with carried.optional("the attributes of points"):
+            carried.point_data |= self._attributes.together(carried)
+        nodes, materials = np.concatenate(self._nodes), np.concatenate(self._materials)
+        with carried.optional("its nodes"):
+            names = {label: self._node_name(label) for label in np.unique(nodes).tolist()}
+            names = {label: name for label, name in names.items() if name}
+            if names or len(np.unique(nodes)) > 1:
+                carried.add_cell_data(NODE, nodes, names=names)
+        with carried.optional("its materials"):
+            if (materials >= 0).any():
+                given = enumerate(self._json["materials"])
+                names = {k: str(material["name"]) for k, material in given if material.get("name")}
+                carried.add_cell_data(MATERIAL, materials, names=names)
+                carried.materials["gltf"] = read_materials(self._document)
+        left = [name for name in _NOT_KEPT if self._json.get(name)]
+        primitives = [part for mesh in self._json.get("meshes", []) for part in mesh["primitives"]]
+        left += ["morph targets"] if any("targets" in part for part in primitives) else []
+        if left:
+            carried.remarks.append(f"left out its {', '.join(left)}")
+
+    def _node_name(self, label: int) -> str:
+        """Return the name of a node or, if it has none, of its mesh."""
+        if not self._json.get("scenes"):
+            return str(self._json["meshes"][label].get("name", ""))
+        node = self._json["nodes"][label]
+        return str(node.get("name") or self._json["meshes"][node["mesh"]].get("name", ""))
+
+    def _add_node(self, index: int, above: npt.NDArray[np.float64], depth: int) -> None:
+        self._n_instances += 1
+        if depth > _DEEPEST or self._n_instances > _MAX_INSTANCES:
+            raise ValueError("malformed: its nodes contain each other")
+        node = self._json["nodes"][index_of(index)]
+        matrix = above @ _matrix(node)
+        if "mesh" in node:
+            self._add_mesh(node["mesh"], matrix, index)
+        for child in node.get("children", []):
+            self._add_node(child, matrix, depth + 1)
+
+    def _add_mesh(self, index: int, matrix: npt.NDArray[np.float64], node: int) -> None:
+        for primitive in self._json["meshes"][index_of(index)]["primitives"]:
+            mode = primitive.get("mode", TRIANGLES)
+            if mode < TRIANGLES:
+                self._cells.ignore("line or point")
+                continue
+            if mode > _FAN:
+                raise ValueError(f"malformed: a primitive has the mode {mode}; expected 0 to 6")
+            points = self._document.numbers(primitive["attributes"]["POSITION"])
+            if points.shape[1] != 3:
+                raise ValueError(f"malformed: positions have {points.shape[1]} coordinates")
+            indices = np.arange(len(points))
+            if "indices" in primitive:
+                indices = self._document.numbers(primitive["indices"]).astype(np.int64).ravel()
+            if len(indices) and indices.max() >= len(points):
+                raise ValueError(f"a face refers to point {indices.max()} but its mesh has {len(points)} points")
+            triangles = _triangles(indices, mode)
+            if np.linalg.det(matrix[:3, :3]) < 0.0:
+                triangles = triangles[:, ::-1]  # a reflection turns triangles inside out
+            self._cells.add("triangle", triangles + self._first_point(primitive, points, matrix))
+            material = primitive.get("material", -1)
+            self._nodes.append(np.full(len(triangles), node))
+            self._materials.append(np.full(len(triangles), material if isinstance(material, int) else -1))
+
+    def _first_point(self, primitive: dict[str, Any], points: npt.NDArray[Any], matrix: npt.NDArray[np.float64]) -> int:
+        """Return the first of the vertices of a primitive, which are added unless another one shares them."""
+        key = (str(primitive["attributes"]), matrix.tobytes())
+        if key not in self._known:
+            self._known[key] = self._n_points
+            self._points.append(points.astype(np.float64) @ matrix[:3, :3].T + matrix[:3, 3])
+            self._n_points += len(points)
+            found = read_attributes(self._document, primitive["attributes"], matrix, self._carried)
+            self._attributes.add(len(points), found)
+        return self._known[key]
+
+
+def _matrix(node: dict[str, Any]) -> npt.NDArray[np.float64]:
+    """Return the transformation (4, 4) of a node: a matrix by columns, or scale, rotation and translation."""
+    if "matrix" in node:
+        return np.array(node["matrix"], dtype=np.float64).reshape(4, 4).T
+    x, y, z, w = map(float, node.get("rotation", (0, 0, 0, 1)))
+    rotation = [
+        [1 - 2 * (y * y + z * z), 2 * (x * y - z * w), 2 * (x * z + y * w)],
+        [2 * (x * y + z * w), 1 - 2 * (x * x + z * z), 2 * (y * z - x * w)],
+        [2 * (x * z - y * w), 2 * (y * z + x * w), 1 - 2 * (x * x + y * y)],
+    ]
+    matrix = np.eye(4)
+    matrix[:3, :3] = np.array(rotation) * np.array(node.get("scale", (1, 1, 1)), dtype=np.float64)
+    matrix[:3, 3] = node.get("translation", (0, 0, 0))
+    return matrix
+
+
+def _triangles(indices: Integers, mode: int) -> Integers:
+    """Return the triangles (n, 3) of a list, a strip or a fan."""
+    if mode == _STRIP:
+        return strip_triangles(indices)
+    if mode == _FAN and len(indices) >= 3:
+        return np.stack([np.full(len(indices) - 2, indices[0]), indices[1:-1], indices[2:]], axis=1)
+    if len(indices) % 3:
+        raise ValueError(f"truncated or malformed: {len(indices)} corners are not whole triangles")
+    return indices.reshape(-1, 3)

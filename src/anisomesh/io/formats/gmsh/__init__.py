@@ -1,0 +1,1 @@
+"""The mesh files of Gmsh (MSH)."""

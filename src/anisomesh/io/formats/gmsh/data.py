@@ -1,0 +1,126 @@
+"""Physical groups, entities, and data of nodes and elements in Gmsh files."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Iterator
+
+import numpy as np
+
+from anisomesh.io.carried import Array, Carried, Integers, grouped_columns, is_region
+from anisomesh.io.formats.gmsh.elements import Entities
+from anisomesh.io.formats.gmsh.numbers import NumberStream
+from anisomesh.io.formats.words import whole
+
+_SURFACE = 2  # dimension
+_SKIPPED = (b"ElementNodeData", b"Periodic", b"GhostElements", b"PartitionedEntities")
+
+
+def sections(data: bytes, name: bytes) -> Iterator[bytes]:
+    """Yield the contents of all sections of a name that end."""
+    begin, end, at = b"$" + name, b"$End" + name, 0
+    while (first := data.find(begin, at)) >= 0:
+        start, stop = data.find(b"\n", first) + 1, data.find(end, first)
+        if start == 0 or stop < start:
+            return
+        if data[first + len(begin) : start].strip() == b"":
+            yield data[start:stop]
+        at = stop + len(end)
+
+
+def read_physical_names(data: bytes, carried: Carried) -> None:
+    """Name the physical groups of surfaces; the names of others are left out with a remark."""
+    others = []
+    for section in sections(data, b"PhysicalNames"):
+        for dimension, number, name in re.findall(rb"^\s*(\d)\s+(-?\d+)\s+\"([^\"\n]*)\"", section, re.MULTILINE):
+            text = name.decode("utf-8", errors="replace")
+            if int(dimension) != _SURFACE:
+                others.append(text)
+            elif "physical" in carried.divisions:
+                carried.divisions["physical"].names[int(number)] = text
+    if others:
+        carried.remarks.append(f"left out the names of physical groups that are not surfaces: {', '.join(others)}")
+    skipped = [name.decode() for name in _SKIPPED if b"$" + name in data]
+    if skipped:
+        carried.remarks.append(f"left out its {', '.join(skipped)}")
+
+
+def read_entities(data: bytes, numbers: NumberStream, carried: Carried, *, is_40: bool) -> Entities:
+    """Return the physical group of each entity of version 4 that has one; the first if it is in several."""
+    entities: Entities = {}
+    n_several = 0
+    for section in sections(data, b"Entities"):
+        with carried.optional("the physical groups"):
+            stream = numbers.of(section)
+            counts = whole(stream.take(4, "size")).tolist()
+            for dimension, count in enumerate(counts):
+                for _ in range(count):
+                    tag = int(whole(stream.take(1, "<i4"))[0])
+                    stream.take(3 if dimension == 0 and not is_40 else 6, "<f8")
+                    groups = _tags(stream)
+                    if dimension > 0:
+                        _tags(stream)
+                    if groups:
+                        entities[dimension, tag] = abs(groups[0])  # negative: turned
+                    n_several += dimension == _SURFACE and len(groups) > 1
+    if n_several:
+        carried.remarks.append(f"{n_several} surface(s) are in several physical groups and kept in the first only")
+    return entities
+
+
+def _tags(stream: NumberStream) -> list[int]:
+    count = int(whole(stream.take(1, "size"))[0])
+    tags: list[int] = whole(stream.take(count, "<i4")).tolist()
+    return tags
+
+
+def read_data(data: bytes, numbers: NumberStream, carried: Carried, tags: tuple[Integers, Integers]) -> None:
+    """Read $NodeData and $ElementData, of the first time step each; ``tags`` are of the nodes and of the elements."""
+    for name, into, rows in (
+        (b"NodeData", carried.point_data, tags[0]),
+        (b"ElementData", carried.cell_data, tags[1]),
+    ):
+        columns: dict[str, Array] = {}
+        for section in sections(data, name):
+            with carried.optional(f"${name.decode()}"):
+                key, values = _data(section, numbers, rows)
+                if key in columns:
+                    carried.remarks.append(f"left out a further time step of the data {key!r}")
+                else:
+                    columns[key] = values
+        for key, values in grouped_columns(columns).items():
+            if into is carried.point_data:
+                into[key] = values
+            else:
+                carried.add_cell_data(key, whole(values) if is_region(key) and _are_integers(values) else values)
+
+
+def _are_integers(values: Array) -> bool:
+    return bool((np.isfinite(values) & (values == np.rint(values))).all()) and values.ndim == 1
+
+
+def _data(section: bytes, numbers: NumberStream, tags: Integers) -> tuple[str, Array]:
+    """Return the name and the rows of data, NaN where there are none."""
+    lines = section.split(b"\n")
+    at, header = 0, []
+    for _ in range(3):  # strings, real numbers, integers
+        count = int(lines[at]) if at < len(lines) else -1
+        if not 0 <= count < len(lines) - at:
+            raise ValueError("truncated: its tags do not end")
+        header.append(lines[at + 1 : at + 1 + count])
+        at += 1 + count
+    if not header[0] or len(header[2]) < 3:
+        raise ValueError("it has no name, or no number of components and of rows")
+    name = header[0][0].strip().strip(b'"').decode("utf-8", errors="replace")
+    width, count = int(header[2][1]), int(header[2][2])
+    if not (0 < width < 100 and 0 <= count <= len(section)):
+        raise ValueError(f"malformed: {name!r} declares {count} rows of {width} numbers")
+    given, rows = numbers.of(b"\n".join(lines[at:])).records(count, width)
+    order = np.argsort(given, kind="stable")
+    place = np.minimum(np.searchsorted(given[order], tags), max(count - 1, 0))
+    known = given[order][place] == tags if count else np.zeros(len(tags), dtype=bool)
+    if not known.any():
+        raise ValueError(f"{name!r} has no row for what is in the file")
+    table = np.full((len(tags), width), np.nan)
+    table[known] = rows[order][place[known]]
+    return name, table[:, 0] if width == 1 else table

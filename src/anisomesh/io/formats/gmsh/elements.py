@@ -1,0 +1,196 @@
+"""Elements of Gmsh files: the types, and the blocks of versions 2 and 4."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+
+from anisomesh.io.carried import Carried, Integers
+from anisomesh.io.cells import N_CORNERS, Shape, SurfaceCells
+from anisomesh.io.formats.gmsh.numbers import NumberStream
+from anisomesh.io.formats.words import whole
+
+TRIANGLE, LINE, POINT = 2, 1, 15  # types of elements of first order
+
+# Number of nodes by type of element; of triangles and quadrilaterals of third order and more, corners come first.
+_TRIANGLES = {2: 3, 9: 6, 20: 9, 21: 10, 22: 12, 23: 15, 24: 15, 25: 21, 42: 28, 43: 36, 44: 45, 45: 55, 46: 66}
+_QUADS = {3: 4, 10: 9, 16: 8, 36: 16, 37: 25, 38: 36, 39: 12, 40: 16, 41: 20, 47: 49, 48: 64, 49: 81, 50: 100, 51: 121}
+_GMSH_OTHERS: dict[str, dict[int, int]] = {
+    "point": {15: 1},
+    "line": {1: 2, 8: 3, 26: 4, 27: 5, 28: 6, 62: 7, 63: 8, 64: 9, 65: 10, 66: 11},
+    "tetra": {4: 4, 11: 10, 29: 20, 30: 35, 31: 56, 71: 84, 72: 120, 73: 165, 74: 220, 75: 286},
+    "hexahedron": {5: 8, 12: 27, 17: 20, 92: 64, 93: 125, 94: 216, 95: 343, 96: 512, 97: 729, 98: 1000},
+    "prism": {6: 6, 13: 18, 18: 15, 90: 40, 91: 75, 106: 126, 107: 196, 108: 288, 109: 405, 110: 550},
+    "pyramid": {7: 5, 14: 14, 19: 13},
+}
+_GMSH_SHAPES: dict[int, Shape] = {**dict.fromkeys(_TRIANGLES, "triangle"), **dict.fromkeys(_QUADS, "quad")}
+_NAMES = {kind: name for name, kinds in _GMSH_OTHERS.items() for kind in kinds}
+_N_NODES = {**_TRIANGLES, **_QUADS, **{kind: n for kinds in _GMSH_OTHERS.values() for kind, n in kinds.items()}}
+
+_QUADRATIC_LINE = 8
+
+Entities = dict[tuple[int, int], int]  # first physical group of an entity, by dimension and tag
+
+
+class Elements:
+    """Collects the elements of a file with their numbers, physical groups and geometrical entities.
+
+    Parameters
+    ----------
+    table
+        Finds nodes by their tags.
+    """
+
+    def __init__(self, table: TagTable) -> None:
+        self.cells = SurfaceCells()
+        self._table = table
+        self._tags: list[tuple[Integers, Integers]] = []  # cells, rows of number, physical group, entity
+        self._count = 0
+        self._surface: list[Integers] = [np.zeros(0, dtype=np.int64)]
+        self._lines: list[Integers] = []
+        self._points: list[Integers] = []
+
+    def take_numbers(self, count: int) -> Integers:
+        """Return numbers (count,) for the next cells of the file, counted from 0."""
+        self._count += count
+        return self.cells.take_numbers(count)
+
+    def add(self, kind: int, nodes: Integers, source: Integers, tags: Integers) -> None:
+        """Add elements of a type.
+
+        Parameters
+        ----------
+        kind
+            The type.
+        nodes
+            Tags of nodes (n, k).
+        source
+            Numbers of the cells (n,).
+        tags
+            Number, physical group and geometrical entity (n, 3).
+        """
+        self._tags.append((source, tags))
+        if kind in _GMSH_SHAPES:
+            self._surface.append(source)
+            shape = _GMSH_SHAPES[kind]
+            nodes_on_sides = _N_NODES[kind] <= 2 * N_CORNERS[shape] + 1
+            self.cells.add(shape, self._table.indices(nodes), source, nodes_on_sides=nodes_on_sides)
+            return
+        self.cells.ignore(_NAMES[kind], len(nodes))
+        if _NAMES[kind] == "line":
+            self._lines.append(self._table.found(nodes[:, : 3 if kind == _QUADRATIC_LINE else 2]))
+        elif kind == POINT:
+            self._points.append(self._table.found(nodes[tags[:, 1] != 0])[:, 0])
+
+    def carry(self, carried: Carried) -> Integers:
+        """Add lines, points and divisions to what the file carries; return the numbers of the elements (n,)."""
+        carried.lines += self._lines
+        carried.fixed_points += self._points
+        table = np.zeros((self._count, 3), dtype=np.int64)
+        for source, tags in self._tags:
+            table[source] = tags
+        physical, entity = table[np.concatenate(self._surface)][:, 1:].T
+        if physical.any():
+            carried.add_cell_data("physical", table[:, 1], names={})
+        if len(np.unique(entity)) > 1 and (entity != entities_of(physical)).any():
+            carried.add_cell_data("geometrical", table[:, 2], names={})
+        numbers: Integers = table[:, 0]
+        return numbers
+
+
+def entities_of(physical: Integers) -> Integers:
+    """Return the entities of elements (n,) if there is one for each physical group: its number, or one from 1."""
+    if len(physical) and physical.min() > 0:
+        return physical
+    return np.unique(physical, return_inverse=True)[1].reshape(-1).astype(np.int64) + 1
+
+
+def elements_2_text(numbers: NumberStream, elements: Elements) -> None:
+    """Read elements of version 2, one a line: number, type, number of tags, tags, nodes."""
+    count = numbers.line_count()
+    by_type: dict[int, tuple[list[list[int]], list[int], list[list[int]]]] = {}
+    for k, line in enumerate(numbers.lines(count)):
+        row = list(map(int, line.split()))
+        kind = row[1] if len(row) > 2 else 0
+        n_tags = row[2] if len(row) > 2 else -1
+        nodes = row[3 + n_tags :] if n_tags >= 0 else []
+        if kind in _N_NODES and len(nodes) != _N_NODES[kind]:
+            raise ValueError(f"truncated or malformed: element line {k + 1} reads {line[:60]!r}")
+        rows, places, tags = by_type.setdefault(kind, ([], [], []))
+        rows.append(nodes)
+        places.append(k)
+        given = row[3 : 3 + min(n_tags, 2)] if n_tags >= 0 else []
+        tags.append([row[0] if row else 0, *given, *[0] * (2 - len(given))])
+    source = elements.take_numbers(count)
+    for kind, (rows, places, tags) in by_type.items():
+        _check_type(kind)
+        elements.add(kind, np.array(rows, dtype=np.int64), source[places], np.array(tags, dtype=np.int64))
+
+
+def elements_2_binary(numbers: NumberStream, elements: Elements) -> None:
+    """Read blocks of elements of version 2: type, number, number of tags, then number, tags and nodes of each."""
+    left = numbers.line_count()
+    while left > 0:
+        kind, count, n_tags = whole(numbers.take(3, "<i4")).tolist()
+        _check_type(kind)
+        if count <= 0 or n_tags < 0:
+            raise ValueError(f"malformed: a block declares {count} elements with {n_tags} tags each")
+        width = 1 + n_tags + _N_NODES[kind]
+        rows = whole(numbers.take(count * width, "<i4")).reshape(count, width)
+        tags = np.zeros((count, 3), dtype=np.int64)
+        tags[:, : 1 + min(n_tags, 2)] = rows[:, : 1 + min(n_tags, 2)]
+        elements.add(kind, rows[:, 1 + n_tags :], elements.take_numbers(count), tags)
+        left -= count
+
+
+def elements_4(numbers: NumberStream, elements: Elements, entities: Entities, *, is_40: bool) -> None:
+    """Read blocks of elements of version 4: entity, type, number, then number and nodes of each."""
+    n_blocks, declared = whole(numbers.take(2 if is_40 else 4, "size"))[:2].tolist()
+    found = 0
+    for _ in range(n_blocks):
+        first, second, kind = whole(numbers.take(3, "<i4")).tolist()
+        dimension, entity = (second, first) if is_40 else (first, second)
+        count = int(whole(numbers.take(1, "size"))[0])
+        _check_type(kind)
+        width = 1 + _N_NODES[kind]
+        rows = whole(numbers.take(count * width, "<i4" if is_40 else "size")).reshape(count, width)
+        tags = np.zeros((count, 3), dtype=np.int64)
+        tags[:, 0], tags[:, 1], tags[:, 2] = rows[:, 0], entities.get((dimension, entity), 0), entity
+        elements.add(kind, rows[:, 1:], elements.take_numbers(count), tags)
+        found += count
+    if found != declared:
+        raise ValueError(f"truncated or malformed: it declares {declared} elements but has {found}")
+
+
+def _check_type(kind: int) -> None:
+    if kind not in _N_NODES:
+        raise ValueError(f"it has elements of type {kind}, which is not known; save it with elements of lower order")
+
+
+class TagTable:
+    """Finds nodes by their tags."""
+
+    def __init__(self, tags: Integers) -> None:
+        self._order = np.argsort(tags, kind="stable")
+        self._sorted = tags[self._order]
+        twice = np.flatnonzero(self._sorted[1:] == self._sorted[:-1])
+        if len(twice):
+            raise ValueError(f"malformed: two nodes have the tag {self._sorted[twice[0]]}")
+
+    def indices(self, tags: npt.NDArray[Any]) -> Integers:
+        """Return the indices of the nodes with these tags, of the same shape."""
+        if len(self._sorted) == 0:
+            raise ValueError("it has elements but no node")
+        place = np.minimum(np.searchsorted(self._sorted, tags), len(self._sorted) - 1)
+        missing = self._sorted[place] != tags
+        if missing.any():
+            raise ValueError(f"an element refers to node {tags[missing][0]}, which is not among the nodes")
+        found: Integers = self._order[place]
+        return found
+
+    def found(self, tags: npt.NDArray[Any]) -> Integers:
+        """Return the indices of nodes with these tags (n, k), without rows that have a tag of no node."""
+        known = np.isin(tags, self._sorted).all(axis=1)
+        return self.indices(tags[known]) if known.any() else np.zeros((0, tags.shape[1]), dtype=np.int64)

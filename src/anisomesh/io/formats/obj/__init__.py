@@ -1,0 +1,1 @@
+"""The OBJ files of Wavefront."""

@@ -1,0 +1,115 @@
+"""What an OBJ file says of points, corners and faces besides their coordinates."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from anisomesh.io.carried import COLOUR, NORMAL, UV, Carried, Integers
+from anisomesh.io.formats.obj.lines import Lines
+
+SMOOTHING = "smoothing_group"
+"""Name of the smoothing groups (``s``) as face data."""
+
+DIVISIONS = {"object": b"o", "group": b"g", "material": b"usemtl"}
+"""The words that begin the regions of divisions."""
+
+LIBRARIES = "mtllib"
+"""Key of the names of the material files."""
+
+
+def take_colours(file: Lines, carried: Carried) -> None:
+    """Add the colours of points, which follow their coordinates, as (V, 3) or with opacity (V, 4)."""
+    with carried.optional("the colours of points"):
+        first = file.lines[file.point_lines[0]].partition(b"#")[0].split() if len(file.point_lines) else []
+        if len(first) >= 7:
+            rows = file.numbers(file.point_lines)
+            if rows.shape[1] < 6:
+                raise ValueError("not every point has one")
+            carried.point_data[COLOUR] = rows[:, 3:7]
+
+
+def corner_numbers(words: list[bytes]) -> Integers | None:
+    """Return the numbers of point, texture and normal of corners (n, 3), if all are written as 1/2/3."""
+    text = b" ".join(words)
+    if text.count(b"/") != 2 * len(words) or any(word.count(b"/") != 2 for word in words):
+        return None
+    try:
+        numbers = np.array(list(map(int, text.replace(b"/", b" ").split())), dtype=np.int64)
+    except (ValueError, OverflowError):
+        return None
+    return numbers.reshape(-1, 3) if numbers.size == 3 * len(words) else None
+
+
+def take_corner_data(file: Lines, words: list[list[bytes]] | Integers, sizes: Integers, carried: Carried) -> None:
+    """Add texture coordinates and normals, given by the corners of faces such as 1/2/3 or their numbers (n, 3)."""
+    indices: Integers = np.zeros((0, 3), dtype=np.int64)
+    if not isinstance(words, list):
+        indices = words
+    elif any(b"/" in word for row in words for word in row):
+        with carried.optional("texture coordinates and normals"):
+            parts = [[int(part) if part else 0 for part in word.split(b"/")[:3]] for row in words for word in row]
+            indices = np.array([[*row, *[0] * (3 - len(row))] for row in parts], dtype=np.int64)
+    for column, word, name, widths in ((1, b"vt", UV, (2, 3)), (2, b"vn", NORMAL, (3, 3))):
+        chosen = indices[:, column]
+        if not chosen.any():
+            continue
+        with carried.optional({UV: "texture coordinates", NORMAL: "normals"}[name]):
+            given = file.of(word)
+            if len(given) == 0:
+                raise ValueError(f"faces refer to {word.decode()} lines, and it has none")
+            table = file.numbers(given)[:, : widths[1]]
+            table = np.pad(table, ((0, 0), (0, max(widths[0] - table.shape[1], 0))))
+            if name == UV and table.shape[1] == 3 and not table[:, 2].any():
+                table = table[:, :2]
+            before = np.repeat(np.searchsorted(given, file.face_lines), sizes)
+            place = np.where(chosen > 0, chosen - 1, chosen + before)
+            missing = chosen == 0
+            wrong = np.flatnonzero(~missing & ((place < 0) | (place >= len(table))))
+            if len(wrong):
+                raise ValueError(f"a face refers to {word.decode()} {chosen[wrong[0]]} of {len(table)}")
+            rows = table[np.where(missing, 0, place)]
+            rows[missing] = 0.0
+            if missing.any():
+                carried.remarks.append(f"{np.count_nonzero(missing)} corner(s) of faces have no {name} and get 0")
+            carried.corner_data[name] = rows
+
+
+def take_divisions(file: Lines, carried: Carried) -> None:
+    """Add the objects, groups and materials of faces, numbered from 1 in the order of the file, and smoothing groups.
+
+    Faces before the first one have the label 0.
+    """
+    for name, word in DIVISIONS.items():
+        with carried.optional(f"its {name}s"):
+            given = file.of(word)
+            texts = [file.rest(k) or "default" for k in given]
+            number = {text: k + 1 for k, text in enumerate(dict.fromkeys(texts))}
+            labels = np.array([0, *(number[text] for text in texts)], dtype=np.int64)
+            of_faces = labels[np.searchsorted(given, file.face_lines)]
+            if of_faces.any():
+                carried.add_cell_data(name, of_faces, names={k: text for text, k in number.items()})
+    with carried.optional("its smoothing groups"):
+        given = file.of(b"s")
+        labels = np.array([0, *(0 if file.rest(k) in ("off", "") else int(file.rest(k)) for k in given)])
+        of_faces = labels[np.searchsorted(given, file.face_lines)]
+        if of_faces.any():
+            carried.cell_data[SMOOTHING] = of_faces
+    libraries = [file.rest(k) for k in file.of(LIBRARIES.encode())]
+    if libraries:
+        carried.materials["obj"] = {LIBRARIES: tuple(dict.fromkeys(libraries))}
+
+
+def take_lines(file: Lines, carried: Carried) -> None:
+    """Add lines as features and points as fixed points."""
+    for word, fewest in ((b"l", 2), (b"p", 1)):
+        for k in file.of(word):
+            with carried.optional(f"line {k + 1}"):
+                before = int(np.searchsorted(file.point_lines, k))
+                raw = [int(text.partition(b"/")[0]) for text in file.lines[k].partition(b"#")[0].split()[1:]]
+                points = np.array([n - 1 if n > 0 else n + before for n in raw], dtype=np.int64)
+                if len(points) < fewest or 0 in raw or (points < 0).any() or (points >= len(file.point_lines)).any():
+                    raise ValueError(f"it reads {file.lines[k][:40]!r}")
+                if word == b"l":
+                    carried.lines.append(np.stack([points[:-1], points[1:]], axis=1))
+                else:
+                    carried.fixed_points.append(points)

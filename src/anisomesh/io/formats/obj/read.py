@@ -1,0 +1,74 @@
+"""Reading of Wavefront's OBJ files."""
+
+from __future__ import annotations
+
+import re
+
+import numpy as np
+import numpy.typing as npt
+
+from anisomesh.io.carried import Carried, Integers
+from anisomesh.io.formats.obj.attributes import (
+    corner_numbers,
+    take_colours,
+    take_corner_data,
+    take_divisions,
+    take_lines,
+)
+from anisomesh.io.formats.obj.lines import Lines
+from anisomesh.io.formats.words import coordinates, integers
+from anisomesh.io.polygons import PolygonSoup
+
+_CURVED = (b"surf", b"bzp", b"bsp", b"cdp", b"res")  # free-form surfaces; the last four are superseded
+_ENDS_OF_LINES = (b"\n", b"\r")
+
+
+def read_obj(data: bytes) -> PolygonSoup:
+    """Read an OBJ file: points, polygons, groups, objects, materials, texture coordinates, normals, colours.
+
+    Notes
+    -----
+    Texture coordinates and normals are corner data, so that texture seams do not split points. Negative indices count
+    back from the last point before the line; a backslash at the end of a line continues it. Lines (``l``) are features
+    and points (``p``) fixed points. Free-form surfaces are left out, with a remark.
+    """
+    lines = re.sub(rb"\\\r?\n", b" ", data).splitlines()
+    kinds = np.array([line[:2].replace(b"\t", b" ") for line in map(bytes.lstrip, lines)], dtype="S2")
+    point_lines = np.flatnonzero(kinds == b"v ")
+    is_face = kinds == b"f "
+    for k in np.flatnonzero(kinds == b"fo"):
+        is_face[k] = lines[k].split(None, 1)[0] == b"fo"  # in files of version 2
+    face_lines = np.flatnonzero(is_face)
+    truncated = np.flatnonzero((kinds == b"v") | (kinds == b"f"))
+    if len(truncated):
+        raise ValueError(f"line {truncated[0] + 1} is cut off: {lines[truncated[0]][:40]!r}")
+    points = coordinates(lines, point_lines, skip=1)
+    words = [lines[k].partition(b"#")[0].split()[1:] for k in face_lines]
+    sizes = np.array([len(row) for row in words], dtype=np.int64)
+    if len(sizes) and sizes[-1] < 3 and face_lines[-1] == len(lines) - 1 and not data.endswith(_ENDS_OF_LINES):
+        raise ValueError(f"truncated: the last line is a face of {sizes[-1]} corners: {lines[-1][:40]!r}")
+    numbers = corner_numbers([word for row in words for word in row])
+    corners = _point_indices(words if numbers is None else numbers, face_lines, sizes, point_lines)
+    curved = [line.split(None, 1)[0].decode() for line in lines if line.startswith(_CURVED)]
+    remarks = (f"left out {len(curved)} free-form surface(s) ({curved[0]})",) if curved else ()
+    carried, file = Carried(), Lines(lines, kinds, point_lines, face_lines)
+    take_colours(file, carried)
+    take_corner_data(file, words if numbers is None else numbers, sizes, carried)
+    take_divisions(file, carried)
+    take_lines(file, carried)
+    return PolygonSoup(points=points, corners=corners, sizes=sizes, remarks=remarks, carried=carried)
+
+
+def _point_indices(
+    words: list[list[bytes]] | Integers, face_lines: Integers, sizes: Integers, point_lines: npt.NDArray[np.intp]
+) -> Integers:
+    """Return the indices of points of all corners, from 0; the first column if numbers (n, 3) are given."""
+    if isinstance(words, list):
+        raw = integers([[word.partition(b"/")[0] for word in row] for row in words], face_lines)
+    else:
+        raw = words[:, 0]
+    if (raw == 0).any():
+        line = np.repeat(face_lines, sizes)[np.flatnonzero(raw == 0)[0]]
+        raise ValueError(f"line {line + 1} refers to point 0; OBJ counts from 1")
+    n_points_before = np.repeat(np.searchsorted(point_lines, face_lines), sizes)
+    return np.where(raw > 0, raw - 1, raw + n_points_before)

@@ -1,0 +1,141 @@
+"""Writing of Wavefront's OBJ files."""
+
+from __future__ import annotations
+
+from itertools import pairwise
+
+import numpy as np
+
+from anisomesh.attributes.model import Mesh, Regions
+from anisomesh.io.carried import COLOUR, NORMAL, UV, Array, Integers
+from anisomesh.io.formats.obj.attributes import DIVISIONS, SMOOTHING
+from anisomesh.io.formats.words import format_rows
+from anisomesh.io.holding import Losses, main_division, name_of
+
+_FREE = ("object", "group")  # words that take a division that OBJ does not know
+
+
+def obj_bytes(mesh: Mesh, losses: Losses) -> bytes:
+    """Return the content of an OBJ file.
+
+    Notes
+    -----
+    Regions keep their names, not their numbers. Faces are in the order of their regions if they would change back and
+    forth between them otherwise.
+    """
+    faces = mesh.surface.faces
+    lines = [_points(mesh)]
+    columns: list[Integers | None] = [faces.astype(np.int64) + 1]
+    for name, word, widths in ((UV, "vt", (2, 3)), (NORMAL, "vn", (3,))):
+        rows, numbers = _at_corners(mesh, name, widths)
+        columns.append(numbers)
+        if rows is not None:
+            lines.append(format_rows(word + " %r" * rows.shape[1] + "\n", rows))
+    states = _states(mesh, losses)
+    lines.append(_faces(columns, states, len(faces)))
+    lines.append(format_rows("l %d %d\n", mesh.features + 1))
+    lines.append(format_rows("p %d\n", mesh.fixed_points + 1))
+    held = [name for name, numbers in zip((UV, NORMAL), columns[1:], strict=True) if numbers is not None]
+    losses.add("corner data", *(name for name in mesh.corner_data if name not in held))
+    held += [] if _colours(mesh) is None else [COLOUR]
+    losses.add("point data", *(name for name in mesh.point_data if name not in held))
+    losses.add("materials", *(name for name in mesh.materials if name != "obj"))
+    return "".join(lines).encode("utf-8", errors="replace")
+
+
+def _points(mesh: Mesh) -> str:
+    """Return the lines of points, with colours."""
+    colours = _colours(mesh)
+    if colours is None:
+        return format_rows("v %r %r %r\n", mesh.surface.points)
+    rows = np.concatenate([mesh.surface.points, colours], axis=1)
+    return format_rows("v" + " %r" * rows.shape[1] + "\n", rows)
+
+
+def _colours(mesh: Mesh) -> Array | None:
+    """Return the colours of points as float64 (V, 3) or (V, 4); integers are shares of their largest."""
+    colours = mesh.point_data.get(COLOUR)
+    if colours is None or colours.ndim != 2 or colours.shape[1] not in (3, 4) or colours.dtype.kind not in "uf":
+        return None
+    largest = np.iinfo(colours.dtype).max if colours.dtype.kind == "u" else 1.0
+    return colours.astype(np.float64) / largest
+
+
+def _at_corners(mesh: Mesh, name: str, widths: tuple[int, ...]) -> tuple[Array | None, Integers | None]:
+    """Return different rows of data at points or corners, and the number of the row of each corner (F, 3) from 1."""
+    faces = mesh.surface.faces.astype(np.int64)
+    given = mesh.corner_data.get(name, mesh.point_data.get(name))
+    if given is None or given.dtype.kind not in "fiu" or given.shape[-1:] not in [(width,) for width in widths]:
+        return None, None
+    if name in mesh.point_data:
+        return (given.astype(np.float64), faces + 1) if given.ndim == 2 else (None, None)
+    if given.ndim != 3:
+        return None, None
+    rows, numbers = np.unique(given.reshape(-1, given.shape[2]).astype(np.float64), axis=0, return_inverse=True)
+    return rows, numbers.reshape(-1, 3).astype(np.int64) + 1
+
+
+def _states(mesh: Mesh, losses: Losses) -> list[tuple[str, Integers, dict[int, str]]]:
+    """Return what changes between faces: the word, the label of each face (F,), and the text for each label."""
+    regions = dict(mesh.regions)
+    found = {name: regions.pop(name) for name in DIVISIONS if name in regions}
+    for slot in _FREE:
+        other = main_division(regions)
+        if slot not in found and other is not None:
+            found[slot] = regions.pop(other[0])
+    losses.add("regions", *regions)
+    states = [
+        (word.decode(), found[name].labels, _texts(name, found[name]))
+        for name, word in DIVISIONS.items()
+        if name in found
+    ]
+    smoothing = mesh.face_data.get(SMOOTHING)
+    is_held = smoothing is not None and smoothing.ndim == 1 and smoothing.dtype.kind in "iu"
+    losses.add("face data", *(name for name in mesh.face_data if name != SMOOTHING or not is_held))
+    if smoothing is not None and is_held:
+        labels = smoothing.astype(np.int64)
+        states.append(("s", labels, {label: str(label) if label else "off" for label in np.unique(labels).tolist()}))
+    return states
+
+
+def _texts(division: str, regions: Regions) -> dict[int, str]:
+    """Return a different text for each label: its name if it has one."""
+    texts: dict[int, str] = {}
+    for label in np.unique(regions.labels).tolist():
+        text = name_of(regions, label) or f"{division}_{label}"
+        texts[label] = f"{text}_{label}" if text in texts.values() else text
+    return texts
+
+
+def _faces(columns: list[Integers | None], states: list[tuple[str, Integers, dict[int, str]]], count: int) -> str:
+    """Return the lines of faces, with a line wherever a state changes."""
+    _, of_texture, of_normal = columns
+    corner = "%d" + ("/%d" if of_texture is not None else "/" if of_normal is not None else "")
+    corner += "/%d" if of_normal is not None else ""
+    pattern = f"f {corner} {corner} {corner}\n"
+    table = np.stack([column for column in columns if column is not None], axis=2).reshape(count, -1)
+    if not states:
+        return format_rows(pattern, table)
+    labels = np.stack([state[1] for state in states], axis=1)
+    order = np.arange(count)
+    changes = (labels[1:] != labels[:-1]).any(axis=1)
+    if np.count_nonzero(changes) >= len(np.unique(labels, axis=0)):
+        order = np.lexsort(labels.T[::-1])
+        changes = (labels[order][1:] != labels[order][:-1]).any(axis=1)
+    begin = [0, *(np.flatnonzero(changes) + 1).tolist(), count]
+    lines: list[str] = []
+    before: list[int | None] = [None] * len(states)
+    for first, end in pairwise(begin):
+        now = labels[order[first]].tolist()
+        for k, (word, _, texts) in enumerate(states):
+            if now[k] != before[k] and not (before[k] is None and _is_nothing(word, now[k], texts)):
+                lines.append(f"{word} {texts[now[k]]}\n")
+                before[k] = now[k]
+        lines.append(format_rows(pattern, table[order[first:end]]))
+    return "".join(lines)
+
+
+def _is_nothing(word: str, label: int, texts: dict[int, str]) -> bool:
+    """Return whether faces in front of the first line of a kind have this label: 0 without a name."""
+    names = {value.decode(): key for key, value in DIVISIONS.items()}
+    return label == 0 and (word == "s" or texts[0] == f"{names[word]}_0")

@@ -1,0 +1,1 @@
+"""The XML files of VTK: unstructured grids (VTU) and polygons (VTP)."""

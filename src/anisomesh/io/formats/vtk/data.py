@@ -1,0 +1,119 @@
+"""Point, cell and field data of VTK's XML files."""
+
+from __future__ import annotations
+
+import re
+from xml.etree.ElementTree import Element
+
+import numpy as np
+
+from anisomesh.io.carried import NORMAL, UV, Array, Carried
+from anisomesh.io.formats.vtk.arrays import ArrayReader
+
+NAMES_OF_REGIONS = "regions of "
+"""Beginning of the names of field data that make cell data a division.
+
+They are text in UTF-8 as bytes, since not every library reads strings: lines of a label and, after a space, its name.
+"""
+
+_ARRAY_TAGS = ("DataArray", "Array")  # the second of strings
+_MEANINGS = (  # attribute of the section, names of arrays in use, our name
+    ("TCoords", ("Texture Coordinates", "TextureCoordinates", "TCoords"), UV),
+    ("Normals", ("Normals",), NORMAL),
+)
+
+
+class PieceData:
+    """The data of one section, such as point data, of all pieces.
+
+    Parameters
+    ----------
+    section
+        ``"PointData"`` or ``"CellData"``.
+    """
+
+    def __init__(self, section: str) -> None:
+        self._section = section
+        self._pieces: list[dict[str, Array]] = []
+
+    def add(self, piece: Element, arrays: ArrayReader, count: int, carried: Carried) -> None:
+        """Add the data of a piece with a number of points or cells, unless it has none."""
+        if count == 0:
+            return
+        found: dict[str, Array] = {}
+        for element in piece.iterfind(f"{self._section}/*"):
+            name = element.get("Name", "")
+            if element.tag in _ARRAY_TAGS and name:
+                with carried.optional(f"{self._section} {name!r}"):
+                    found[name] = _rows(element, arrays, count)
+        self._pieces.append(found)
+
+    def all(self, carried: Carried) -> dict[str, Array]:
+        """Return the arrays that every piece has; the others are left out with a remark."""
+        together: dict[str, Array] = {}
+        for name in dict.fromkeys(name for piece in self._pieces for name in piece):
+            parts = [piece[name] for piece in self._pieces if name in piece]
+            if len(parts) < len(self._pieces):
+                missing = len(self._pieces) - len(parts)
+                carried.remarks.append(
+                    f"left out {self._section} {name!r}, which {missing} of {len(self._pieces)} pieces lack"
+                )
+                continue
+            with carried.optional(f"{self._section} {name!r}"):
+                together[name] = np.concatenate(parts) if len(parts) > 1 else parts[0]
+        return together
+
+
+def _rows(element: Element, arrays: ArrayReader, count: int) -> Array:
+    """Return an array (count,) or (count, k)."""
+    values = arrays.read(element)
+    width = element.get("NumberOfComponents", "1")
+    if not width.isdigit() or len(values) != count * int(width):
+        raise ValueError(f"it has {len(values)} values of {width[:10]} components; expected {count} rows")
+    return values.reshape(count, int(width)) if int(width) > 1 else values
+
+
+def read_field_data(root: Element, kind: str, arrays: ArrayReader, carried: Carried) -> dict[str, dict[int, str]]:
+    """Return the names of regions by division; other field data are materials."""
+    names: dict[str, dict[int, str]] = {}
+    others: dict[str, Array] = {}
+    for element in root.iterfind(f"{kind}/FieldData/*"):
+        name = element.get("Name", "")
+        if element.tag not in _ARRAY_TAGS or not name:
+            continue
+        with carried.optional(f"FieldData {name!r}"):
+            values = arrays.read(element)
+            if name.startswith(NAMES_OF_REGIONS) and values.dtype == np.uint8:
+                names[name.removeprefix(NAMES_OF_REGIONS)] = _labels(values.tobytes().decode("utf-8", errors="replace"))
+            else:
+                width = element.get("NumberOfComponents", "1")
+                shape = (-1, int(width)) if width.isdigit() and int(width) > 1 else (-1,)
+                others[name] = values.reshape(shape)
+    if others:
+        carried.materials["field_data"] = others
+    return names
+
+
+def _labels(text: str) -> dict[int, str]:
+    found = {}
+    for line in text.splitlines():
+        match = re.fullmatch(r"(-?\d{1,18})(?: (.*))?", line)
+        if match is None:
+            raise ValueError(f"{line[:40]!r} is not a label and its name")
+        if match[2]:
+            found[int(match[1])] = match[2]
+    return found
+
+
+def names_by_meaning(piece: Element) -> dict[str, str]:
+    """Return our names of the point data of a piece that VTK knows as normals or texture coordinates."""
+    section = piece.find("PointData")
+    if section is None:
+        return {}
+    present = {element.get("Name", "") for element in section}
+    found = {}
+    for attribute, usual, ours in _MEANINGS:
+        name = next((name for name in (section.get(attribute, ""), *usual) if name and name in present), None)
+        if name is not None and ours not in present:
+            found[name] = ours
+    return found

@@ -1,0 +1,169 @@
+"""Writing of VTK's XML files, compressed, in one piece."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Any
+from xml.sax.saxutils import quoteattr
+
+import numpy as np
+import numpy.typing as npt
+
+from anisomesh._arrays import Points
+from anisomesh.attributes.model import Mesh
+from anisomesh.io.carried import NORMAL, UV, Array
+from anisomesh.io.formats.vtk.arrays import packed_array, string_codes, type_name
+from anisomesh.io.formats.vtk.data import NAMES_OF_REGIONS
+from anisomesh.io.holding import Losses, continuous_corner_data, flat_rows, name_of, numeric, regions_as_integers
+from anisomesh.io.polygons import Integers
+from anisomesh.io.vtk_cells import LINE, POLYGON, QUAD, TRIANGLE, VERTEX
+
+Data = Mapping[str, npt.NDArray[Any]]
+
+_CELL_TYPES = {3: TRIANGLE, 4: QUAD}  # by number of corners; others are polygons
+
+
+def vtu_mesh_bytes(mesh: Mesh, losses: Losses) -> bytes:
+    """Return a mesh as an unstructured grid: triangles, then features as lines and fixed points as vertices.
+
+    Notes
+    -----
+    Regions are cell data, with their names in field data. Cell data of lines and vertices are NaN, 0 or empty.
+    """
+    points, faces = mesh.surface.points, mesh.surface.faces
+    lines, vertices = mesh.features, mesh.fixed_points
+    sizes = np.repeat([3, 2, 1], [len(faces), len(lines), len(vertices)])
+    types = np.repeat(np.array([TRIANGLE, LINE, VERTEX], dtype=np.uint8), [len(faces), len(lines), len(vertices)])
+    connectivity = np.concatenate([faces.ravel(), lines.ravel(), vertices]).astype(np.int64)
+    cells: Data = {"connectivity": connectivity, "offsets": np.cumsum(sizes), "types": types}
+    point_data, cell_data, fields = _data(mesh, losses)
+    cell_data = {name: _padded(values, 0, len(lines) + len(vertices)) for name, values in cell_data.items()}
+    counts = f'NumberOfCells="{len(sizes)}"'
+    return _file("UnstructuredGrid", points, counts, {"Cells": cells}, (point_data, cell_data, fields))
+
+
+def vtp_mesh_bytes(mesh: Mesh, losses: Losses) -> bytes:
+    """Return a mesh as polygon data: as :func:`vtu_mesh_bytes`, with vertices and lines in front."""
+    points, faces = mesh.surface.points, mesh.surface.faces
+    sections: dict[str, Data] = {}
+    for name, cells in (("Verts", mesh.fixed_points[:, None]), ("Lines", mesh.features), ("Polys", faces)):
+        if len(cells):
+            ends = np.arange(1, len(cells) + 1) * cells.shape[1]
+            sections[name] = {"connectivity": cells.ravel().astype(np.int64), "offsets": ends}
+    n_before = len(mesh.fixed_points) + len(mesh.features)
+    point_data, cell_data, fields = _data(mesh, losses)
+    cell_data = {name: _padded(values, n_before, 0) for name, values in cell_data.items()}
+    counts = (
+        f'NumberOfVerts="{len(mesh.fixed_points)}" NumberOfLines="{len(mesh.features)}" NumberOfStrips="0" '
+        f'NumberOfPolys="{len(faces)}"'
+    )
+    return _file("PolyData", points, counts, sections, (point_data, cell_data, fields))
+
+
+def _data(mesh: Mesh, losses: Losses) -> tuple[dict[str, Array], dict[str, Array], dict[str, Array]]:
+    """Return the point, cell and field data that hold what a mesh carries."""
+    point_data = _storable({**mesh.point_data, **continuous_corner_data(mesh, losses)}, "point data", losses)
+    cell_data = _storable(mesh.face_data, "face data", losses)
+    losses.add("face data", *(name for name in mesh.regions if name in cell_data))
+    cell_data |= regions_as_integers(mesh, list(mesh.regions))
+    fields = {}
+    for name, division in mesh.regions.items():
+        lines = [f"{label} {name_of(division, label)}" for label in division.names]
+        text = "\n".join(lines or [str(division.labels[0])])
+        fields[NAMES_OF_REGIONS + name] = np.frombuffer(text.encode("utf-8", errors="replace"), np.uint8)
+    given = mesh.materials.get("field_data", {})
+    if isinstance(given, Mapping):
+        fields |= _storable({name: np.asarray(values) for name, values in given.items()}, "field data", losses)
+    losses.add("materials", *(name for name in mesh.materials if name != "field_data"))
+    return point_data, cell_data, fields
+
+
+def _storable(data: Mapping[str, Array], what: str, losses: Losses) -> dict[str, Array]:
+    """Return arrays of numbers and strings as rows."""
+    strings = {name: values.astype(np.str_) for name, values in data.items() if values.dtype.kind in "SU"}
+    strings = {name: values for name, values in strings.items() if values.ndim == 1 and values.size}
+    numbers = numeric({name: values for name, values in data.items() if name not in strings}, what, losses)
+    return {**{name: flat_rows(values) for name, values in numbers.items()}, **strings}
+
+
+def _padded(values: Array, before: int, after: int) -> Array:
+    """Return an array with rows in front and behind of NaN, 0 or empty strings."""
+    if before + after == 0:
+        return values
+    fill: Any = {"f": np.nan, "U": ""}.get(values.dtype.kind, 0)
+    rows = [np.full((count, *values.shape[1:]), fill, dtype=values.dtype) for count in (before, after)]
+    return np.concatenate([rows[0], values, rows[1]])
+
+
+def vtu_bytes(
+    points: Points, corners: npt.NDArray[Any], sizes: Integers, point_data: Data, cell_data: Data | None = None
+) -> bytes:
+    """Return polygons as an unstructured grid.
+
+    Parameters
+    ----------
+    points
+        Coordinates (V, 3).
+    corners, sizes
+        Point indices of all polygons, concatenated, and the number of corners of each (P,).
+    point_data, cell_data
+        Arrays (V,) or (V, k) and (P,) or (P, k) by name.
+    """
+    types = np.full(len(sizes), POLYGON, dtype=np.uint8)
+    for size, cell_type in _CELL_TYPES.items():
+        types[sizes == size] = cell_type
+    arrays: Data = {"connectivity": _indices(corners), "offsets": np.cumsum(sizes), "types": types}
+    counts = f'NumberOfCells="{len(sizes)}"'
+    return _file("UnstructuredGrid", points, counts, {"Cells": arrays}, (point_data, cell_data or {}, {}))
+
+
+def vtp_bytes(points: Points, corners: npt.NDArray[Any], sizes: Integers, point_data: Data) -> bytes:
+    """Return polygons as polygon data; parameters as for :func:`vtu_bytes`."""
+    arrays = {"connectivity": _indices(corners), "offsets": np.cumsum(sizes)}
+    counts = f'NumberOfVerts="0" NumberOfLines="0" NumberOfStrips="0" NumberOfPolys="{len(sizes)}"'
+    return _file("PolyData", points, counts, {"Polys": arrays}, (point_data, {}, {}))
+
+
+def _indices(corners: npt.NDArray[Any]) -> npt.NDArray[np.int64]:
+    return np.asarray(corners, dtype=np.int64).ravel()
+
+
+def _file(kind: str, points: Points, counts: str, cells: Mapping[str, Data], data: tuple[Data, Data, Data]) -> bytes:
+    """Return a file with sections of cells, and point, cell and field data."""
+    head = f'type="{kind}" version="1.0" byte_order="LittleEndian" header_type="UInt64"'
+    point_data, cell_data, fields = data
+    return "\n".join(
+        [
+            '<?xml version="1.0"?>',
+            f'<VTKFile {head} compressor="vtkZLibDataCompressor">',
+            f"<{kind}>",
+            *([_section("FieldData", fields)] if fields else []),
+            f'<Piece NumberOfPoints="{len(points)}" {counts}>',
+            _section("Points", {"Points": np.asarray(points, dtype=np.float64)}),
+            *(_section(name, arrays) for name, arrays in cells.items()),
+            _section("PointData", point_data),
+            _section("CellData", cell_data),
+            f"</Piece></{kind}></VTKFile>\n",
+        ]
+    ).encode()
+
+
+def _section(name: str, arrays: Data) -> str:
+    lines = []
+    for key, values in arrays.items():
+        count = "" if values.ndim == 1 else f' NumberOfComponents="{values.shape[1]}"'
+        count += f' NumberOfTuples="{len(values)}"' if name == "FieldData" else ""
+        tag, kind, numbers = "DataArray", "", values
+        if values.dtype.kind == "U":
+            tag, kind, numbers = "Array", "String", string_codes(values)
+        head = f'<{tag} type="{kind or type_name(values)}" Name={quoteattr(key)} format="binary"{count}>'
+        lines.append(f"{head}\n{packed_array(numbers)}\n</{tag}>")
+    meanings = [(UV, "TCoords", (2, 3)), (NORMAL, "Normals", (3,))] if name == "PointData" else []
+    found = [(ours, attribute) for ours, attribute, widths in meanings if _width(arrays.get(ours)) in widths]
+    known = "".join(f' {attribute}="{ours}"' for ours, attribute in found)
+    return "\n".join([f"<{name}{known}>", *lines, f"</{name}>"])
+
+
+def _width(values: Array | None) -> int:
+    """Return the number of components of numbers, 0 for none."""
+    return 0 if values is None or values.ndim < 2 or values.dtype.kind not in "iuf" else int(values.shape[1])

@@ -1,0 +1,124 @@
+"""What a format can hold of a mesh, and what is left out of a file."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+
+import numpy as np
+
+from anisomesh.attributes.model import Mesh, Regions
+from anisomesh.io.carried import Array, Integers
+
+_PREFERRED = ("physical", "material", "group", "object", "solid", "node", "reference")  # divisions, if one is kept
+
+
+_LARGEST_EXACT = 2**53  # up to it every integer has a float64
+
+
+class Losses:
+    """Collects what a format cannot hold, for one warning."""
+
+    def __init__(self) -> None:
+        self._names: dict[str, list[str]] = {}
+        self._others: list[str] = []
+
+    def add(self, what: str, *names: str) -> None:
+        """Add data of a kind, such as point data, with these names."""
+        if names:
+            self._names.setdefault(what, []).extend(name for name in names if name not in self._names.get(what, []))
+
+    def say(self, what: str) -> None:
+        """Add something else."""
+        self._others.append(what)
+
+    def features(self, mesh: Mesh) -> None:
+        """Add the features and fixed points of a mesh."""
+        if len(mesh.features):
+            self.say(f"{len(mesh.features)} feature edge(s)")
+        if len(mesh.fixed_points):
+            self.say(f"{len(mesh.fixed_points)} fixed point(s)")
+
+    def names_of_regions(self, mesh: Mesh, *divisions: str) -> None:
+        """Add the names of the regions of divisions that have names."""
+        self.add("names of regions", *(name for name in divisions if mesh.regions[name].names))
+
+    def text(self) -> str:
+        """Return everything in one line, empty if nothing is left out."""
+        parts = [f"{what} {', '.join(map(repr, names))}" for what, names in self._names.items()]
+        return "; ".join([*parts, *self._others])
+
+
+def numeric(data: Mapping[str, Array], what: str, losses: Losses) -> dict[str, Array]:
+    """Return the arrays of real numbers, of types that files have: bools as bytes, odd floats as float32 or float64."""
+    kept = {}
+    for name, values in data.items():
+        kind, size = values.dtype.kind, values.dtype.itemsize
+        if kind not in "biuf" or values.size == 0:
+            losses.add(what, name)
+        elif kind == "b":
+            kept[name] = values.astype(np.uint8)
+        elif kind == "f" and size not in (4, 8):
+            kept[name] = values.astype(np.float32 if size == 2 else np.float64)
+        else:
+            kept[name] = values
+    return kept
+
+
+def is_exact_in_float64(values: Array) -> bool:
+    """Return whether float64 holds numbers exactly: all but large integers of 64 bits."""
+    if values.dtype.kind not in "iu" or values.dtype.itemsize < 8:
+        return True
+    return max(-int(values.min()), int(values.max())) <= _LARGEST_EXACT
+
+
+def flat_rows(values: Array) -> Array:
+    """Return an array as (n,) or (n, k)."""
+    return values if values.ndim == 1 else values.reshape(len(values), -1)
+
+
+def main_division(regions: Mapping[str, Regions], *preferred: str) -> tuple[str, Regions] | None:
+    """Return the division for a format that holds one: one of these names, else the most telling one."""
+    wanted = (*preferred, *_PREFERRED, *sorted(regions))
+    return next(((name, regions[name]) for name in wanted if name in regions), None)
+
+
+def by_label(*labels: Integers) -> list[tuple[tuple[int, ...], Integers]]:
+    """Return the faces (n,) with each combination of labels (F,), in the order of the labels."""
+    order = np.lexsort(labels[::-1])
+    table = np.stack(labels, axis=1)[order]
+    begin = np.flatnonzero((np.diff(table, axis=0, prepend=table[:1] - 1) != 0).any(axis=1))
+    keys = [tuple(row) for row in table[begin].tolist()]
+    return list(zip(keys, np.split(order.astype(np.int64), begin[1:]), strict=True))
+
+
+def continuous_corner_data(mesh: Mesh, losses: Losses) -> dict[str, Array]:
+    """Return the corner data that are the same in all faces at each point as point data; the others are lost."""
+    kept = {}
+    points = mesh.surface.faces.ravel()
+    for name, values in mesh.corner_data.items():
+        rows = values.reshape(len(points), *values.shape[2:])
+        at_points = np.zeros((mesh.surface.n_points, *values.shape[2:]), dtype=values.dtype)
+        at_points[points] = rows
+        same = at_points[points] == rows
+        if values.dtype.kind in "fc":
+            same |= np.isnan(at_points[points]) & np.isnan(rows)
+        if same.all():
+            kept[name] = at_points
+        else:
+            losses.add("corner data", name)
+    return kept
+
+
+def name_of(regions: Regions, label: int, otherwise: str = "") -> str:
+    """Return the name of a label in one line, or something else if it has none."""
+    return " ".join(regions.names.get(label, otherwise).split())
+
+
+def regions_as_integers(mesh: Mesh, divisions: Sequence[str]) -> dict[str, Integers]:
+    """Return the labels of divisions in the smallest of int32 and int64 that holds them."""
+    labels = {name: mesh.regions[name].labels for name in divisions}
+    limits = np.iinfo(np.int32)
+    return {
+        name: values.astype(np.int32) if values.min() >= limits.min and values.max() <= limits.max else values
+        for name, values in labels.items()
+    }

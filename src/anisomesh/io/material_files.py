@@ -1,0 +1,159 @@
+"""Files beside mesh files: materials of OBJ (.mtl), and textures."""
+
+from __future__ import annotations
+
+import os
+import re
+from collections.abc import Callable, Mapping
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+from urllib.parse import quote, unquote
+
+from anisomesh.attributes.model import Mesh
+from anisomesh.io.atomic import atomic_path
+from anisomesh.io.formats.obj.attributes import LIBRARIES
+from anisomesh.io.holding import Losses
+
+_MARK = "# materials of a mesh that anisomesh has written\n"
+_TEXTURE = re.compile(r"\s*(?:map_\w+|bump|disp|decal|refl|norm)\s", re.IGNORECASE)
+
+
+def read_beside(mesh: Mesh, path: Path) -> tuple[Mesh, tuple[str, ...]]:
+    """Return a mesh with the text and the folder of its material files, and what is missing, a line each."""
+    folder = folder_of(path)
+    mesh = with_texture_names(mesh, lambda name: absolute_name(name, folder))
+    given = mesh.materials.get("obj")
+    if given is None:
+        return mesh, ()
+    texts, losses = [], []
+    for name in _names(given[LIBRARIES], folder):
+        file = folder / name
+        try:
+            if file.suffix.lower() != ".mtl":
+                raise OSError("expected a .mtl file")
+            texts.append(file.read_text(encoding="utf-8", errors="surrogateescape"))
+        except (OSError, ValueError) as error:
+            losses.append(f"left out the materials of {name!r}: {getattr(error, 'strerror', None) or error}")
+    found = {**given, "text": "\n".join(texts), "folder": str(folder)} if texts else given
+    return replace(mesh, materials={**mesh.materials, "obj": found}), tuple(losses)
+
+
+def folder_of(path: str | os.PathLike[str]) -> Path:
+    """Return the folder of a file, without links."""
+    return Path(os.path.realpath(Path(path).parent))
+
+
+def with_texture_names(mesh: Mesh, rename: Callable[[str], str]) -> Mesh:
+    """Return a mesh with other names of the textures that comments of PLY and images of GLB name."""
+    materials = dict(mesh.materials)
+    names, gltf = materials.get("texture_files"), materials.get("gltf")
+    if isinstance(names, tuple | list):
+        materials["texture_files"] = tuple(rename(str(name)) for name in names)
+    if isinstance(gltf, Mapping) and any(_is_file(image) for image in gltf.get("images", ())):
+        images = [
+            {**image, "uri": quote(rename(unquote(image["uri"])))} if _is_file(image) else image
+            for image in gltf["images"]
+        ]
+        materials["gltf"] = {**gltf, "images": images}
+    return replace(mesh, materials=materials)
+
+
+def _is_file(image: Mapping[str, Any]) -> bool:
+    """Return whether an image is in a file, not in a view or in the text itself."""
+    return isinstance(image.get("uri"), str) and not re.match(r"[a-zA-Z][a-zA-Z+.-]+:", image["uri"])
+
+
+def absolute_name(name: str, folder: Path) -> str:
+    """Return the absolute name of a file that a name refers to in a folder; the same name if there is none."""
+    try:
+        return str((folder / name).resolve()) if (folder / name).is_file() else name
+    except (OSError, ValueError):  # too long, or not a name
+        return name
+
+
+def relative_name(name: str, folder: Path) -> str:
+    """Return the name from a folder of a file with an absolute name; the same name for others."""
+    try:
+        return os.path.relpath(name, folder).replace(os.sep, "/") if Path(name).is_absolute() else name
+    except ValueError:  # on another drive
+        return name
+
+
+def _names(libraries: tuple[str, ...], folder: Path) -> list[str]:
+    """Return the names of files in lines, in each of which there may be several, or one with spaces."""
+    names = []
+    for line in libraries:
+        names += [line] if (folder / line).exists() or not line.lower().count(".mtl ") else line.split()
+    return names
+
+
+def write_beside(content: bytes, mesh: Mesh, path: Path | None, losses: Losses) -> bytes:
+    """Return the content of an OBJ file with the name of its material file, which is written beside it.
+
+    Parameters
+    ----------
+    content
+        The content without materials.
+    mesh
+        The mesh.
+    path
+        The OBJ file; None for a stream, beside which nothing can be written.
+    losses
+        What is left out is added here.
+
+    Notes
+    -----
+    In the folder of the input its material files are named again. Elsewhere their content is written to a file with the
+    stem of the OBJ file, and textures are named by paths relative to it; they are not copied.
+    """
+    given = mesh.materials.get("obj")
+    if not isinstance(given, Mapping) or LIBRARIES not in given:
+        losses.add("materials", *(["obj"] if "obj" in mesh.materials else []))
+        return content
+    libraries = given[LIBRARIES]
+    if "text" not in given or path is None:
+        if "text" in given:
+            losses.say("the content of material files, since a stream has no folder; it only names them")
+    elif str(folder := folder_of(path)) != given.get("folder", ""):
+        target = _free_name(folder, path.stem)
+        text = _MARK + _moved(given["text"], Path(given.get("folder", "")), folder)
+        with atomic_path(target) as temporary:
+            temporary.write_text(text, encoding="utf-8", errors="surrogateescape", newline="")
+        libraries = (target.name,)
+    lines = "".join(f"{LIBRARIES} {name}\n" for name in libraries)
+    return lines.encode("utf-8", errors="replace") + content
+
+
+def _free_name(folder: Path, stem: str) -> Path:
+    """Return a name that no file of the user has; a file of ours is replaced."""
+    number = 0
+    while True:
+        target = folder / (f"{stem}_{number}.mtl" if number else f"{stem}.mtl")
+        if not target.exists() or (target.is_file() and target.read_bytes().startswith(_MARK.encode())):
+            return target
+        number += 1
+
+
+def _moved(text: str, old: Path, new: Path) -> str:
+    """Return materials with the textures that are found from the old folder named from the new one."""
+    lines = []
+    for line in text.splitlines():
+        place = _texture_name(line, old) if _TEXTURE.match(line) else None
+        if place is not None:
+            line = line[:place] + relative_name(str(old / line[place:].strip()), new)
+        lines.append(line)
+    return "\n".join([*lines, ""])
+
+
+def _texture_name(line: str, folder: Path) -> int | None:
+    """Return where the name of an existing file begins that ends a line, after options and their values."""
+    starts = [match.end() for match in re.finditer(r"\s+", line.rstrip())]
+    for start in starts:
+        name = line[start:].strip()
+        try:
+            if name and not Path(name).is_absolute() and (folder / name).is_file():
+                return start
+        except (OSError, ValueError):
+            continue
+    return None
