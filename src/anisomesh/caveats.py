@@ -81,7 +81,7 @@ def losses_of_attributes(before: Mesh, after: Mesh) -> Iterator[str]:
     n = len(np.unique(before.surface.points[before.fixed_points], axis=0))
     lost = n - len(after.fixed_points)
     if lost > 0:
-        yield f"{lost:,} of {n:,} fixed points are no points of the result; ask for more vertices"
+        yield f"{lost:,} of {n:,} fixed points have no vertex of the result; ask for more vertices"
 
 
 def caveats(

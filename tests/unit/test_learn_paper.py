@@ -262,7 +262,7 @@ def task_and_example(surface, target, norm="batch", **options):
 @pytest.mark.parametrize("weight", [0.1, 0.5])
 @pytest.mark.parametrize("size", [1.0, 0.2])
 def test_losses_are_the_sum_of_the_paper_times_a_factor_of_the_target(name, weight, size):
-    """The ratio of losses of two predictions is that of the unscaled sum, so the weight is the paper's w_lap."""
+    """Losses of two predictions have the ratio of the unscaled sums, so the weight is the w_lap of the paper."""
     surface = shaken(sphere(1))
     surface = surface.with_points(size * surface.points / surface.diagonal)
     rng = np.random.default_rng(0)

@@ -30,7 +30,7 @@ class Corners(NamedTuple):
     concave
         Corners that had no clearly convex angle (n,).
     queue
-        Ears and their stamps (3 n, 2): from the beginning those of good shape, from the end thin ones.
+        Ears and their stamps (3 n, 2): well-shaped ones from the beginning, thin ones from the end.
     """
 
     xy: Any

@@ -157,7 +157,7 @@ def _in_file_order(
 
 
 def strip_triangles(strip: npt.NDArray[Any]) -> Integers:
-    """Return the triangles (n, 3) of a strip of points, every other one turned, without those of repeated points."""
+    """Return the triangles (n, 3) of a strip of points, every other one turned, without the ones of repeated points."""
     strip = np.asarray(strip, dtype=np.int64)
     if len(strip) < 3:
         return np.zeros((0, 3), dtype=np.int64)

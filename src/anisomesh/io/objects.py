@@ -27,7 +27,7 @@ def polygon_soup(mesh: Any) -> PolygonSoup | None:
     ----------
     mesh
         A ``trimesh.Scene``, with its transformations applied; a ``meshio.Mesh``; a ``pyvista.MultiBlock``, or any data
-        set of PyVista whose cells can be those of an unstructured grid.
+        set of PyVista that can become an unstructured grid.
 
     Raises
     ------
@@ -110,7 +110,7 @@ class _PointList:
         self._parts: list[npt.NDArray[np.float64]] = [np.zeros((0, 3))]
 
     def add(self, points: Any) -> int:
-        """Add points (n, 3) or (n, 2); return the number of those before."""
+        """Add points (n, 3) or (n, 2); return the number of points before them."""
         first = sum(map(len, self._parts))
         array = np.asarray(points, dtype=np.float64)
         self._parts.append(np.pad(array, ((0, 0), (0, 3 - array.shape[1]))))

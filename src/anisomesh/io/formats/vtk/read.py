@@ -105,7 +105,7 @@ class _Points:
         self.count = 0
 
     def add(self, piece: ElementTree.Element, arrays: ArrayReader) -> int:
-        """Add the points of a piece; return the number of those before."""
+        """Add the points of a piece; return the number of points before them."""
         first = self.count
         declared = piece.get("NumberOfPoints", "")
         element = piece.find("Points/DataArray")
