@@ -21,6 +21,7 @@ from anisomesh.resolve import embedding_name, is_designed
 _AT_CORNER = 1e-3  # of the diagonal, within which a vertex is at a corner
 _VOLUME_TOLERANCE = 0.05  # share by which the enclosed volume may change without a remark
 _FEATURE_TOLERANCE = 0.25  # mean edge lengths from prescribed edges to edges of the result without a remark
+_SHRUNK_SHARE, _MAX_NAMED = 0.1, 5  # of the area of a region that may be lost without a remark; regions named
 _OFF_SHARE = 0.05  # of a mesh on which lengths may be off without a remark
 COUNT_TOLERANCE = 0.02  # share of the vertices asked for by which a result may differ without a remark
 
@@ -78,10 +79,30 @@ def losses_of_attributes(before: Mesh, after: Mesh) -> Iterator[str]:
     if moved:
         names = ", ".join(moved)
         yield f"point data with different values at coincident points are corner data of the result: {names}"
+    yield from _shrunk_regions(before, after)
     n = len(np.unique(before.surface.points[before.fixed_points], axis=0))
     lost = n - len(after.fixed_points)
     if lost > 0:
         yield f"{lost:,} of {n:,} fixed points have no vertex of the result; ask for more vertices"
+
+
+def _shrunk_regions(before: Mesh, after: Mesh) -> Iterator[str]:
+    """Yield a sentence if regions are lost or have lost a considerable part of their area."""
+    lost = []
+    for division, regions in before.regions.items():
+        if division not in after.regions:
+            continue
+        labels, own = np.unique(regions.labels, return_inverse=True)
+        old = np.bincount(own, before.surface.face_areas, minlength=len(labels))
+        kept = np.isin(after.regions[division].labels, labels)
+        place = np.searchsorted(labels, after.regions[division].labels[kept])
+        new = np.bincount(place, after.surface.face_areas[kept], minlength=len(labels))
+        for k in np.flatnonzero(new < (1.0 - _SHRUNK_SHARE) * old):
+            name = regions.names.get(int(labels[k]), f"{division} {labels[k]}")
+            lost.append(f"{name} ({new[k] / old[k] - 1.0:+.0%})")
+    if lost:
+        more = f" and {len(lost) - _MAX_NAMED:,} more" if len(lost) > _MAX_NAMED else ""
+        yield f"regions have lost area: {', '.join(lost[:_MAX_NAMED])}{more}; ask for more vertices"
 
 
 def caveats(

@@ -169,3 +169,15 @@ def test_the_search_for_a_distance_carries_attributes():
     mesh = Mesh(surface=BOX, regions={"side": Regions(sides_of(BOX))})
     result = anisomesh.remesh(mesh, max_error=1e-3)
     np.testing.assert_array_equal(result.mesh.regions["side"].labels, sides_of(result.surface))
+
+
+def test_a_region_that_gets_lost_is_named():
+    ball = shapes.sphere(3)
+    labels = np.zeros(ball.n_faces, dtype=np.int64)
+    labels[np.argsort(-ball.points[ball.faces][:, :, 2].mean(axis=1), kind="stable")[:2]] = 7
+    mesh = anisomesh.Mesh(surface=ball, regions={"part": anisomesh.Regions(labels, {7: "patch"})})
+    result = anisomesh.remesh(mesh, n_vertices=100, embedding="direct")
+    before, after = (m.surface.face_areas[m.regions["part"].labels == 7].sum() for m in (mesh, result.mesh))
+    said = [line for line in result.warnings if "regions have lost area" in line]
+    assert bool(said) == bool(after < 0.9 * before)
+    assert all("patch" in line for line in said)

@@ -41,7 +41,7 @@ def test_other_targets_and_grids(ball):
 
 
 def test_errors_and_warnings_are_those_of_a_remesh(ball, caplog):
-    with pytest.raises(anisomesh.OptionError, match="give one of n_vertices, ratio and max_error"):
+    with pytest.raises(anisomesh.OptionError, match="give one of n_vertices, ratio, max_error and edge_length"):
         ball.anisomesh.remesh()
     tube = pyvista.ParametricTorus(u_res=24, v_res=12, w_res=12).triangulate()
     expected = anisomesh.remesh(tube, n_vertices=4, **FEW).warnings

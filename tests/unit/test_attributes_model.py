@@ -74,3 +74,22 @@ def test_a_mesh_says_what_it_carries_and_can_be_pickled():
     assert Mesh(surface=BOX).is_bare
     assert not mesh.is_bare
     assert repr(pickle.loads(pickle.dumps(mesh))) == repr(mesh)
+
+
+@pytest.mark.parametrize(
+    ("field", "value", "words"),
+    [
+        ("point_data", None, "expected a dictionary"),
+        ("regions", None, "expected a dictionary"),
+        ("point_data", {1: np.zeros(8)}, "expected a string"),
+        ("point_data", {"a": np.zeros((8, 0))}, "its rows are empty"),
+    ],
+)
+def test_what_is_not_data_by_name_is_refused(field, value, words):
+    with pytest.raises(MeshError, match=words):
+        Mesh(surface=box(n=1), **{field: value})
+
+
+def test_labels_beyond_64_bits_are_refused():
+    with pytest.raises(MeshError, match="int64"):
+        Regions(np.array([1, 2**64 - 1], dtype=np.uint64))

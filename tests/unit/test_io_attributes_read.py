@@ -220,7 +220,7 @@ def test_gmsh(tmp_path, caplog):
     said = [record.getMessage().partition(": ")[2] for record in caplog.records]
     assert said == [
         "1 surface(s) are in several physical groups and kept in the first only",
-        "left out the names of physical groups that are not surfaces: rim",
+        "left out physical groups of lines and points, whose edges and points are kept: rim",
         "left out its ElementNodeData",
         "left out a further time step of the data 'flow'",
     ]
@@ -445,3 +445,15 @@ def test_the_geometry_survives_broken_attributes(tmp_path, caplog, name):
     mesh = read(tmp_path, name, content)
     assert mesh.surface.n_faces > 0
     assert message is None or message in caplog.text
+
+
+@pytest.mark.parametrize("spelling", ["my textures/red wall.png", "my textures\\red wall.png"])
+def test_textures_are_found_from_the_folder_of_the_materials(tmp_path, spelling):
+    (tmp_path / "mats" / "my textures").mkdir(parents=True)
+    (tmp_path / "mats" / "my textures" / "red wall.png").write_bytes(b"png")
+    (tmp_path / "mats" / "box.mtl").write_text(f"newmtl red\nmap_Kd {spelling}\n")
+    (tmp_path / "a.obj").write_text("mtllib mats/box.mtl\nv 0 0 0\nv 1 0 0\nv 0 1 0\nusemtl red\nf 1 2 3\n")
+    (tmp_path / "out").mkdir()
+    save(load_mesh(tmp_path / "a.obj"), tmp_path / "out" / "b.obj")
+    (line,) = [row for row in (tmp_path / "out" / "b.mtl").read_text().splitlines() if row.startswith("map_Kd ")]
+    assert (tmp_path / "out" / line.removeprefix("map_Kd ")).is_file()

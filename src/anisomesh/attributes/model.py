@@ -88,21 +88,31 @@ class Mesh:
         n_points, n_faces = self.surface.n_points, self.surface.n_faces
         shapes = {"point_data": (n_points,), "face_data": (n_faces,), "corner_data": (n_faces, 3)}
         for data, shape in shapes.items():
-            given = dict(getattr(self, data))
+            given = self._mapping(data)
             object.__setattr__(self, data, {name: _checked(f"{data}[{name!r}]", given[name], shape) for name in given})
         both = sorted(set(self.point_data) & set(self.corner_data))
         if both:
             raise MeshError(f"{both[0]!r} is in point_data and in corner_data; give them different names")
-        for name, regions in self.regions.items():
+        for name, regions in self._mapping("regions").items():
             if not isinstance(regions, Regions):
                 raise MeshError(
                     f"regions[{name!r}] is of type {type(regions).__name__}; expected Regions(labels, names)"
                 )
             _checked(f"regions[{name!r}].labels", regions.labels, (n_faces,))
         object.__setattr__(self, "regions", dict(self.regions))
-        object.__setattr__(self, "materials", dict(self.materials))
+        object.__setattr__(self, "materials", self._mapping("materials"))
         object.__setattr__(self, "features", _points_of("features", self.features, n_points, 2))
         object.__setattr__(self, "fixed_points", _points_of("fixed_points", self.fixed_points, n_points, 1))
+
+    def _mapping(self, what: str) -> dict[str, Any]:
+        """Return a field by name, or an error unless it is a mapping with names for keys."""
+        given = getattr(self, what)
+        if not isinstance(given, Mapping):
+            raise MeshError(f"{what} is of type {type(given).__name__}; expected a dictionary of names")
+        wrong = [name for name in given if not isinstance(name, str)]
+        if wrong:
+            raise MeshError(f"{what} has the name {wrong[0]!r} of type {type(wrong[0]).__name__}; expected a string")
+        return dict(given)
 
     def __repr__(self) -> str:
         names = {f.name: len(getattr(self, f.name)) for f in fields(self) if f.name != "surface"}
@@ -144,6 +154,8 @@ def _checked(name: str, values: Any, shape: tuple[int, ...]) -> Array:
         expected = ", ".join(map(str, shape))
         of_what = {1: "a row for each point or face", 2: "a row for each corner of each face"}[len(shape)]
         raise MeshError(f"{name} has shape {array.shape}; expected ({expected}, ...), {of_what} of the surface")
+    if 0 in array.shape[len(shape) :]:
+        raise MeshError(f"{name} has shape {array.shape}, so its rows are empty; leave it out")
     array.flags.writeable = False
     return array
 
@@ -155,6 +167,8 @@ def _whole_numbers(name: str, values: Any) -> Ints:
         array = array.astype(np.int64)
     if array.dtype.kind not in "iu":
         raise MeshError(f"{name} have dtype {array.dtype}; expected integers")
+    if array.dtype.kind == "u" and array.size and array.max() > np.iinfo(np.int64).max:
+        raise MeshError(f"{name} has {array.max()}; expected at most {np.iinfo(np.int64).max}, which is int64")
     array = array.astype(np.int64)
     array.flags.writeable = False
     return array

@@ -11,9 +11,10 @@ from anisomesh._arrays import EdgeMask, Edges, PointMask, Points
 from anisomesh.mesh.closest_points import ClosestPoints
 from anisomesh.mesh.geometry import face_cross, unit
 from anisomesh.mesh.surface import Surface
-from anisomesh.mesh.topology import edge_keys
+from anisomesh.mesh.topology import edge_keys, graph_components
 
 _ROUNDS, _PAIRS = 3, 2  # of flips and smoothing, and pairs of steps of smoothing after the flips of each
+_SHORTEST_LINE = 24  # edges: shorter ones stay, since a small loop would shrink; heuristic
 _STEPS = (0.5, -0.52)  # of the way to the middle of the two neighbours: the first ends a zigzag, the second shrinkage
 _MIN_TURN_COSINE = 0.7  # between the normals of a face before and after
 _MIN_AREA = 0.2  # of a face, over its area before
@@ -35,7 +36,7 @@ def with_smooth_lines(
     others
         Other marked edges (E,), which stay.
     fixed
-        Points (V,) that stay, besides ends and junctions of lines.
+        Points (V,) that stay, besides ends and junctions of lines, and short lines.
 
     Returns
     -------
@@ -55,6 +56,8 @@ def with_smooth_lines(
     keys = [edge_keys(surface.edges[mask]) for mask in (lines, *others)]
     ends = surface.edges[lines]
     movable = (np.bincount(ends.ravel(), minlength=surface.n_points) == 2) & ~fixed
+    line = graph_components(ends, surface.n_points)[1]
+    movable &= (np.bincount(line[ends[:, 0]], minlength=line.max() + 1) >= _SHORTEST_LINE)[line]
     reference, moved = ClosestPoints(surface), surface
     for _ in range(_ROUNDS if movable.any() else 0):
         moved = _with_room(moved, keys[0], np.concatenate(keys))

@@ -32,7 +32,8 @@ def read_beside(mesh: Mesh, path: Path) -> tuple[Mesh, tuple[str, ...]]:
         try:
             if file.suffix.lower() != ".mtl":
                 raise OSError("expected a .mtl file")
-            texts.append(file.read_text(encoding="utf-8", errors="surrogateescape"))
+            text = file.read_text(encoding="utf-8", errors="surrogateescape")
+            texts.append(text if file.parent == folder else _moved(text, file.parent, folder))
         except (OSError, ValueError) as error:
             losses.append(f"left out the materials of {name!r}: {getattr(error, 'strerror', None) or error}")
     found = {**given, "text": "\n".join(texts), "folder": str(folder)} if texts else given
@@ -139,9 +140,11 @@ def _moved(text: str, old: Path, new: Path) -> str:
     """Return materials with the textures that are found from the old folder named from the new one."""
     lines = []
     for line in text.splitlines():
-        place = _texture_name(line, old) if _TEXTURE.match(line) else None
-        if place is not None:
-            line = line[:place] + relative_name(str(old / line[place:].strip()), new)
+        for spelling in (line, line.replace("\\", "/")) if _TEXTURE.match(line) else ():  # backslashes of Windows
+            place = _texture_name(spelling, old)
+            if place is not None:
+                line = spelling[:place] + relative_name(str(old / spelling[place:].strip()), new)
+                break
         lines.append(line)
     return "\n".join([*lines, ""])
 

@@ -58,13 +58,14 @@ class PreparedInput:
     seams: EdgeMask
     fixed: PointMask
 
-    def features_at(self, n_vertices: int) -> tuple[EdgeMask, tuple[str, ...]]:
+    def features_at(self, n_vertices: int, surface: Surface) -> tuple[EdgeMask, tuple[str, ...]]:
         """Return the edges (E,) to follow with a number of vertices, and what has to be said about the others.
+
+        ``surface`` is the prepared surface at bounding-box diagonal 1.
 
         Borders and then seams are followed as long as vertices on them, at the distance of even ones, are not more than
         a share of all.
         """
-        surface = self.prepared.surface
         spacing = even_edge_length(surface.area, n_vertices)
         followed, remarks = self.tagged.copy(), []
         for what, edges in (("borders between regions", self.borders), ("seams of corner data", self.seams)):

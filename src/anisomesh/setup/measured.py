@@ -99,7 +99,7 @@ def measure(source: PreparedInput, n: int, options: RemeshOptions, run: Run) -> 
         frame = unit_frame(prepared.surface.points)
         surface = prepared.surface.with_points(frame.to_unit(prepared.surface.points))
         options = with_embedding_chosen(options, surface)
-        tagged, remarks = source.features_at(n)
+        tagged, remarks = source.features_at(n, surface)
         surface, tagged = _with_smooth_borders(surface, source, tagged, options.feature_angle)
         creases = sharp_edges(surface, min(options.feature_angle, WEAK_ANGLE))
         creases |= source.fixed[surface.edges].any(axis=1)  # so that the points stay

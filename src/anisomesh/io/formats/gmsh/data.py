@@ -39,7 +39,9 @@ def read_physical_names(data: bytes, carried: Carried) -> None:
             elif "physical" in carried.divisions:
                 carried.divisions["physical"].names[int(number)] = text
     if others:
-        carried.remarks.append(f"left out the names of physical groups that are not surfaces: {', '.join(others)}")
+        carried.remarks.append(
+            f"left out physical groups of lines and points, whose edges and points are kept: {', '.join(others)}"
+        )
     skipped = [name.decode() for name in _SKIPPED if b"$" + name in data]
     if skipped:
         carried.remarks.append(f"left out its {', '.join(skipped)}")
