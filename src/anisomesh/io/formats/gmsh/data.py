@@ -39,8 +39,9 @@ def read_physical_names(data: bytes, carried: Carried) -> None:
             elif "physical" in carried.divisions:
                 carried.divisions["physical"].names[int(number)] = text
     if others:
+        named = ", ".join(others)
         carried.remarks.append(
-            f"left out physical groups of lines and points, whose edges and points are kept: {', '.join(others)}"
+            f"left out physical groups of lines and points, whose edges and points are kept: {named}"
         )
     skipped = [name.decode() for name in _SKIPPED if b"$" + name in data]
     if skipped:
