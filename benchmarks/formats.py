@@ -15,7 +15,8 @@ from pathlib import Path
 import numpy as np
 
 from anisomesh.attributes.model import Mesh, Regions
-from anisomesh.io.meshes import MESH_FORMATS, load_mesh, save
+from anisomesh.io.known_formats import MESH_FORMATS
+from anisomesh.io.meshes import load_mesh, save
 from anisomesh.shapes.analytic import box
 
 PAGE = Path(__file__).parents[1] / "docs/reference/formats.md"

@@ -33,10 +33,7 @@ from anisomesh.mesh.surface import Surface
 from anisomesh.mesh.validity import Validity, check_validity
 from anisomesh.metric.conformity import Conformity, MetricExtent, conformity
 from anisomesh.options import MIN_VERTICES, RemeshOptions, read_target, with_overrides
-from anisomesh.resolve import (
-    cvt_options,
-    embedding_name,
-)
+from anisomesh.resolve import cvt_options, embedding_name
 from anisomesh.result import RemeshResult
 from anisomesh.setup.inputs import PreparedInput, prepared_input
 from anisomesh.setup.measured import count_for_length, unit_of_lengths
@@ -158,10 +155,11 @@ def _remesh(
     was asked for.
     """
     prepared, tasks = source.prepared, set_up(source, n, options, run, nearest=nearest)
-    frame, task, field = tasks.frame, tasks.dual, tasks.field
+    measured, task = tasks.measured, tasks.dual
+    frame, field = measured.frame, measured.field
     run.check_time()
     order = task.voronoi.embedded.face_order
-    made = _valid_mesh(task, tasks.fit, tasks.options, run)
+    made = _valid_mesh(task, tasks.fit, measured.options, run)
     mesh, optimised, validity = made.mesh, made.optimised, made.validity
     agreement = _agreement(mesh, tasks, asked) if asked or task.error_weights is not None else None
     surface = Surface(frame.to_model(mesh.points), mesh.faces)
@@ -173,7 +171,7 @@ def _remesh(
         working=task.voronoi.embedded.surface,
         tensors=field.tensors,
         corner_tensors=None if field.corner_tensors is None else field.corner_tensors[order],
-        embedding_name=embedding_name(tasks.options),
+        embedding_name=embedding_name(measured.options),
         noise=field.noise,
         frame=frame,
         embedding=tasks.embedding,
@@ -189,12 +187,12 @@ def _remesh(
         seconds=run.total_seconds(),
         warnings=(
             *losses_of_repair(prepared.report),
-            *tasks.remarks,
+            *measured.remarks,
             *field.remarks,
             *losses_of_shape(
-                tasks.surface, Surface(mesh.points, mesh.faces), task.corner_places, made.feature_distance
+                measured.surface, Surface(mesh.points, mesh.faces), task.corner_places, made.feature_distance
             ),
-            *caveats(n, field.noise, mesh, validity, optimised, tasks.options),
+            *caveats(n, field.noise, mesh, validity, optimised, measured.options),
             *(() if agreement is None else unfollowed_sizes(agreement)),
         ),
         conformity=agreement,
@@ -209,7 +207,7 @@ def _agreement(mesh: ValidMesh, tasks: Tasks, asked: float | None) -> Conformity
         tasks.metric,
         MetricExtent.of(tasks.metric.surface.surface, tasks.metric.field),
         asked=asked,
-        unit=unit_of_lengths(tasks.options, tasks.frame),
+        unit=unit_of_lengths(tasks.measured.options, tasks.measured.frame),
     )
 
 

@@ -179,5 +179,5 @@ def test_shells_complete_commands_options_and_values(run_process, monkeypatch):
     assert completed("anisomesh remesh a.ply --max-e") == ["--max-error"]
     assert completed("anisomesh remesh a.ply --metric u") == ["uniform"]
     monkeypatch.delenv("_ANISOMESH_COMPLETE")
-    monkeypatch.setenv("_TYPER_COMPLETE_TEST_DISABLE_SHELL_DETECTION", "1")  # the parent process may be no shell
+    monkeypatch.setenv("_TYPER_COMPLETE_TEST_DISABLE_SHELL_DETECTION", "1")  # the parent process need not be a shell
     assert "_ANISOMESH_COMPLETE=complete_bash" in run_process("--show-completion", "bash").stdout

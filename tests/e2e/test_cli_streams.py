@@ -9,7 +9,8 @@ import numpy as np
 import pytest
 
 from anisomesh.errors import MeshFileError
-from anisomesh.io.meshes import MESH_FORMATS, load, save
+from anisomesh.io.known_formats import MESH_FORMATS
+from anisomesh.io.meshes import load, save
 from anisomesh.shapes import analytic as shapes
 from conftest import CLI
 

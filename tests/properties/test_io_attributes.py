@@ -13,7 +13,8 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from anisomesh.attributes.model import Mesh, Regions
-from anisomesh.io.meshes import MESH_FORMATS, load, load_mesh, save
+from anisomesh.io.known_formats import MESH_FORMATS
+from anisomesh.io.meshes import load, load_mesh, save
 from anisomesh.mesh.surface import Surface
 from anisomesh.shapes import analytic as shapes
 from conftest import examples

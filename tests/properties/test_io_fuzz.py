@@ -11,7 +11,8 @@ import pytest
 
 from anisomesh.attributes.model import Mesh, Regions
 from anisomesh.errors import MeshFileError
-from anisomesh.io.meshes import MESH_FORMATS, load_mesh, save
+from anisomesh.io.known_formats import MESH_FORMATS
+from anisomesh.io.meshes import load_mesh, save
 from anisomesh.mesh.surface import Surface
 
 pytestmark = pytest.mark.slow

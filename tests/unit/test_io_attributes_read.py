@@ -10,7 +10,8 @@ import numpy as np
 import pytest
 
 from anisomesh.attributes.model import Mesh, Regions
-from anisomesh.io.meshes import MESH_FORMATS, load, load_mesh, save
+from anisomesh.io.known_formats import MESH_FORMATS
+from anisomesh.io.meshes import load, load_mesh, save
 from anisomesh.shapes import analytic as shapes
 
 TRIANGLES = "3 0 1 2\n3 1 3 2\n"

@@ -13,7 +13,8 @@ import trimesh
 
 from anisomesh.errors import MeshError, MeshFileError
 from anisomesh.io.atomic import atomic_path
-from anisomesh.io.meshes import MESH_FORMATS, load, save
+from anisomesh.io.known_formats import MESH_FORMATS
+from anisomesh.io.meshes import load, save
 from anisomesh.mesh.surface import Surface
 from anisomesh.shapes import analytic as shapes
 

@@ -136,7 +136,7 @@ def default_output(source: Path, input_format: str | None, output_format: str | 
 
 def check_format(name: str, where: str) -> None:
     """Raise typer.BadParameter if a name, such as ply or .ply, is not a mesh format; ``where`` begins the message."""
-    from anisomesh.io.meshes import MESH_FORMATS
+    from anisomesh.io.known_formats import MESH_FORMATS
 
     if "." + name.lower().removeprefix(".") not in MESH_FORMATS:
         expected = ", ".join(sorted(MESH_FORMATS))

@@ -29,10 +29,8 @@ _BROKEN = (
     zlib.error,
     lzma.LZMAError,
 )  # what malformed data make readers raise
-_FEW_REGIONS, _FACES_PER_REGION = (
-    8,
-    2,
-)  # of integers that are regions by name: if more, with so many faces each; heuristic
+_FEW_REGIONS = 8  # up to which integers with a telling name are regions in any case; heuristic
+_FACES_PER_REGION = 2  # at least, if there are more; heuristic
 _REGION = re.compile(
     r"(gmsh:)?(physical|geometrical)|medit:ref|reference|(domain|part|zone|block|region|material|group|object|solid)s?"
     r"|(cell_?entity|model_?face|domain|part|zone|block|region|material|group|object|face|boundary)_?(ids?|tags?|labels?)",

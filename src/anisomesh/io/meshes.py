@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import logging
 import os
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 from dataclasses import replace
 from pathlib import Path
 from typing import Any, BinaryIO
@@ -18,58 +18,14 @@ from anisomesh.io import material_files
 from anisomesh.io.assemble import as_mesh
 from anisomesh.io.atomic import atomic_path
 from anisomesh.io.convert import as_surface
-from anisomesh.io.formats.gltf.read import read_glb
-from anisomesh.io.formats.gltf.write import glb_bytes
-from anisomesh.io.formats.gmsh.read import read_msh
-from anisomesh.io.formats.gmsh.write import msh_bytes
-from anisomesh.io.formats.medit.read import read_medit
-from anisomesh.io.formats.medit.write import medit_bytes
-from anisomesh.io.formats.obj.read import read_obj
-from anisomesh.io.formats.obj.write import obj_bytes
-from anisomesh.io.formats.off import off_bytes, read_off
-from anisomesh.io.formats.ply.read import read_ply
-from anisomesh.io.formats.ply.write import ply_bytes
-from anisomesh.io.formats.stl import read_stl, stl_bytes
-from anisomesh.io.formats.threemf.read import read_3mf
-from anisomesh.io.formats.threemf.write import threemf_bytes
-from anisomesh.io.formats.vtk.read import read_vtp, read_vtu
-from anisomesh.io.formats.vtk.write import vtp_mesh_bytes, vtu_mesh_bytes
 from anisomesh.io.formats.words import BYTE_ORDER_MARK
 from anisomesh.io.holding import Losses
-from anisomesh.io.polygons import PolygonSoup
+from anisomesh.io.known_formats import READERS, TEXT_FORMATS, WRITERS, known_suffix
 from anisomesh.mesh.surface import Surface
 
 logger = logging.getLogger(__name__)
 
 PointData = Mapping[str, npt.NDArray[Any]]  # arrays (V,) or (V, k) by name
-
-_READERS: dict[str, Callable[[bytes], PolygonSoup]] = {
-    ".obj": read_obj,
-    ".off": read_off,
-    ".ply": read_ply,
-    ".stl": read_stl,
-    ".glb": read_glb,
-    ".3mf": read_3mf,
-    ".vtu": read_vtu,
-    ".vtp": read_vtp,
-    ".msh": read_msh,
-    ".mesh": read_medit,
-}
-_WRITERS: dict[str, Callable[[Mesh, Losses], bytes]] = {
-    ".obj": obj_bytes,
-    ".off": off_bytes,
-    ".ply": ply_bytes,
-    ".stl": stl_bytes,
-    ".glb": glb_bytes,
-    ".3mf": threemf_bytes,
-    ".vtu": vtu_mesh_bytes,
-    ".vtp": vtp_mesh_bytes,
-    ".msh": msh_bytes,
-    ".mesh": medit_bytes,
-}
-_TEXT_FORMATS = (".obj", ".off", ".ply", ".msh", ".mesh")  # may begin with a byte order mark
-MESH_FORMATS = tuple(_READERS)
-"""Extensions that :func:`load` and :func:`save` know, in lower case with the dot."""
 
 
 def load(path: str | os.PathLike[str] | BinaryIO, *, file_format: str | None = None) -> Surface:
@@ -146,10 +102,10 @@ def _read(path: str | os.PathLike[str] | BinaryIO, file_format: str | None) -> t
     if not data.strip():
         raise MeshFileError(f"{name}: the file is empty; expected a mesh")
     try:
-        if suffix in _TEXT_FORMATS:
+        if suffix in TEXT_FORMATS:
             data = data.removeprefix(BYTE_ORDER_MARK)
         with np.errstate(over="ignore", invalid="ignore"):  # what is not finite is reported by polygons.validate
-            mesh, remarks, losses = as_mesh(_READERS[suffix](data))
+            mesh, remarks, losses = as_mesh(READERS[suffix](data))
     except Exception as error:
         # Our readers raise ValueError with an explanation; other exceptions come from libraries.
         reason = str(error)
@@ -191,14 +147,14 @@ def _content(path: str | os.PathLike[str] | BinaryIO, file_format: str | None) -
     """Return the name of a file or stream for messages, the extension of its format, and its bytes."""
     if not isinstance(path, str | os.PathLike) and hasattr(path, "read"):
         name = _stream_name(path)
-        suffix = _known_suffix(name, file_format)
+        suffix = known_suffix(name, file_format)
         try:
             return name, suffix, bytes(path.read())
         except (OSError, TypeError) as error:
             raise MeshFileError(f"{name}: cannot be read: {error}; expected a stream of bytes") from error
     file = _as_path(path)
     try:
-        suffix = "" if file.is_dir() else _known_suffix(file, file_format)
+        suffix = "" if file.is_dir() else known_suffix(file, file_format)
         return str(file), suffix, file.read_bytes()
     except FileNotFoundError as error:
         raise MeshFileError(f"{file}: no such file; expected a mesh file") from error
@@ -246,14 +202,14 @@ def save(
     stream: Any = path if not isinstance(path, str | os.PathLike) and hasattr(path, "write") else None
     name = str(_as_path(path)) if stream is None else _stream_name(stream)
     mesh = mesh if isinstance(mesh, Mesh) else Mesh(surface=as_surface(mesh))
-    suffix = _known_suffix(name, file_format)
+    suffix = known_suffix(name, file_format)
     if point_data:
         mesh = _with_point_data(mesh, name, point_data)
     folder = Path.cwd() if stream is not None else material_files.folder_of(name)
     mesh = material_files.with_texture_names(mesh, lambda name: material_files.relative_name(name, folder))
     losses = Losses()
     try:
-        content = _WRITERS[suffix](mesh, losses)
+        content = WRITERS[suffix](mesh, losses)
     except ValueError as error:
         raise MeshFileError(f"{name}: cannot be written: {error}") from error
     if suffix == ".obj":
@@ -303,19 +259,3 @@ def _point_array(path: str, name: str, values: Any, n_points: int) -> npt.NDArra
     if array.dtype.kind == "b":
         return array.astype(np.uint8)
     return array.astype(np.float64) if array.dtype.itemsize not in (1, 2, 4, 8) or array.dtype == np.float16 else array
-
-
-def _known_suffix(path: str | Path, file_format: str | None) -> str:
-    """Return the extension of the format in lower case, or raise MeshFileError if it is unknown."""
-    expected = ", ".join(sorted(MESH_FORMATS))
-    if file_format is not None:
-        suffix = "." + file_format.lower().removeprefix(".") if isinstance(file_format, str) else ""
-        if suffix not in MESH_FORMATS:
-            raise MeshFileError(f"{path}: unknown format {file_format!r}; expected one of {expected}")
-        return suffix
-    suffix = Path(path).suffix.lower()
-    if suffix not in MESH_FORMATS:
-        raise MeshFileError(
-            f"{path}: unknown format {Path(path).suffix or '(no extension)'}; expected one of {expected}"
-        )
-    return suffix

@@ -114,7 +114,7 @@ def as_triangles(soup: PolygonSoup) -> Triangles:
     Raises
     ------
     ValueError
-        If there is no polygon, an index is out of range, or a coordinate of a polygon is not finite.
+        If polygons are missing, an index is out of range, or a coordinate of a polygon is not finite.
     """
     kept, soup = _without_odd_parts(soup)
     validate(soup)
@@ -166,7 +166,7 @@ def _without_odd_parts(soup: PolygonSoup) -> tuple[Integers | None, PolygonSoup]
 
 
 def validate(soup: PolygonSoup) -> None:
-    """Raise ValueError if there is no polygon, or one with fewer than 3 corners, a bad index or coordinate."""
+    """Raise ValueError if polygons are missing or have fewer than 3 corners, a bad index or a bad coordinate."""
     if len(soup.sizes) == 0:
         raise ValueError("it has no face")
     few = np.flatnonzero(soup.sizes < 3)

@@ -18,7 +18,6 @@ from anisomesh.fitting.fit import FitPlan
 from anisomesh.fitting.target import FitTarget
 from anisomesh.mesh.closest_points import ClosestPoints
 from anisomesh.mesh.embedded_surface import EmbeddedSurface
-from anisomesh.mesh.geometry import Frame
 from anisomesh.mesh.surface import Surface
 from anisomesh.metric.field import MetricField
 from anisomesh.metric.thin_walls import separate_thin_walls
@@ -26,7 +25,7 @@ from anisomesh.metric.transfer import PlacedMetric
 from anisomesh.options import RemeshOptions
 from anisomesh.resolve import embedder, fit_plan, follows_creases, prescribes_sizes
 from anisomesh.setup.inputs import PreparedInput
-from anisomesh.setup.measured import measure
+from anisomesh.setup.measured import Measured, measure
 from anisomesh.voronoi.restricted import RestrictedVoronoi
 
 
@@ -36,35 +35,23 @@ class Tasks:
 
     Attributes
     ----------
-    options
-        The options, with the embedding chosen.
-    frame
-        From model units to bounding-box diagonal 1.
-    surface
-        The surface that the mesh is to approximate, at bounding-box diagonal 1.
-    field
-        The metric on the embedded surface.
+    measured
+        The surface with its metric, and the options with the embedding chosen.
     metric
-        The same there with what a density adds, if sizes are prescribed.
+        The metric on the embedded surface, with what a density adds if sizes are prescribed.
     embedding
         The embedding of that surface.
     dual
         The task to make a mesh from sites.
     fit
         What that mesh is fitted to, None if it is not.
-    remarks
-        What a user should know, one sentence each.
     """
 
-    options: RemeshOptions
-    frame: Frame
-    surface: Surface
-    field: MetricField
+    measured: Measured
     metric: PlacedMetric
     embedding: Embedding
     dual: MeshingTask
     fit: FitTarget | None
-    remarks: tuple[str, ...]
 
 
 def set_up(source: PreparedInput, n: int, options: RemeshOptions, run: Run, *, nearest: bool) -> Tasks:
@@ -99,17 +86,7 @@ def set_up(source: PreparedInput, n: int, options: RemeshOptions, run: Run, *, n
         target = None
         if plan is not None:
             target = _fit_target(task, measured.tagged, metric, plan, options, prescribed=prescribed)
-    return Tasks(
-        options=options,
-        frame=measured.frame,
-        surface=surface,
-        field=field,
-        metric=metric,
-        embedding=embedding,
-        dual=task,
-        fit=target,
-        remarks=measured.remarks,
-    )
+    return Tasks(measured=measured, metric=metric, embedding=embedding, dual=task, fit=target)
 
 
 def _with_density(field: MetricField, density: PointScalars | None, surface: Surface) -> MetricField:

@@ -10,7 +10,7 @@ from pathlib import Path
 from typing import Literal
 
 from anisomesh.errors import OptionError
-from anisomesh.io.meshes import MESH_FORMATS
+from anisomesh.io.known_formats import MESH_FORMATS
 from anisomesh.learn.data.recipe import Recipe
 
 Split = Literal["training", "validation"]

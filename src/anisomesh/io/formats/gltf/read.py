@@ -55,7 +55,7 @@ class _Scene:
         self._materials: list[Integers] = [np.zeros(0, dtype=np.int64)]
 
     def soup(self) -> PolygonSoup:
-        """Return the meshes of the scene, or all meshes if there is no scene."""
+        """Return the meshes of the scene, or all meshes of a file without scenes."""
         scenes = self._json.get("scenes", [])
         if scenes:
             for node in scenes[self._json.get("scene", 0)].get("nodes", []):

@@ -1,0 +1,71 @@
+"""The formats of mesh files by their extensions."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from pathlib import Path
+
+from anisomesh.attributes.model import Mesh
+from anisomesh.errors import MeshFileError
+from anisomesh.io.formats.gltf.read import read_glb
+from anisomesh.io.formats.gltf.write import glb_bytes
+from anisomesh.io.formats.gmsh.read import read_msh
+from anisomesh.io.formats.gmsh.write import msh_bytes
+from anisomesh.io.formats.medit.read import read_medit
+from anisomesh.io.formats.medit.write import medit_bytes
+from anisomesh.io.formats.obj.read import read_obj
+from anisomesh.io.formats.obj.write import obj_bytes
+from anisomesh.io.formats.off import off_bytes, read_off
+from anisomesh.io.formats.ply.read import read_ply
+from anisomesh.io.formats.ply.write import ply_bytes
+from anisomesh.io.formats.stl import read_stl, stl_bytes
+from anisomesh.io.formats.threemf.read import read_3mf
+from anisomesh.io.formats.threemf.write import threemf_bytes
+from anisomesh.io.formats.vtk.read import read_vtp, read_vtu
+from anisomesh.io.formats.vtk.write import vtp_mesh_bytes, vtu_mesh_bytes
+from anisomesh.io.holding import Losses
+from anisomesh.io.polygons import PolygonSoup
+
+READERS: dict[str, Callable[[bytes], PolygonSoup]] = {
+    ".obj": read_obj,
+    ".off": read_off,
+    ".ply": read_ply,
+    ".stl": read_stl,
+    ".glb": read_glb,
+    ".3mf": read_3mf,
+    ".vtu": read_vtu,
+    ".vtp": read_vtp,
+    ".msh": read_msh,
+    ".mesh": read_medit,
+}
+WRITERS: dict[str, Callable[[Mesh, Losses], bytes]] = {
+    ".obj": obj_bytes,
+    ".off": off_bytes,
+    ".ply": ply_bytes,
+    ".stl": stl_bytes,
+    ".glb": glb_bytes,
+    ".3mf": threemf_bytes,
+    ".vtu": vtu_mesh_bytes,
+    ".vtp": vtp_mesh_bytes,
+    ".msh": msh_bytes,
+    ".mesh": medit_bytes,
+}
+TEXT_FORMATS = (".obj", ".off", ".ply", ".msh", ".mesh")  # may begin with a byte order mark
+MESH_FORMATS = tuple(READERS)
+"""Extensions of files that are read and written, in lower case with the dot."""
+
+
+def known_suffix(path: str | Path, file_format: str | None) -> str:
+    """Return the extension of the format in lower case, or raise MeshFileError if it is unknown."""
+    expected = ", ".join(sorted(MESH_FORMATS))
+    if file_format is not None:
+        suffix = "." + file_format.lower().removeprefix(".") if isinstance(file_format, str) else ""
+        if suffix not in MESH_FORMATS:
+            raise MeshFileError(f"{path}: unknown format {file_format!r}; expected one of {expected}")
+        return suffix
+    suffix = Path(path).suffix.lower()
+    if suffix not in MESH_FORMATS:
+        raise MeshFileError(
+            f"{path}: unknown format {Path(path).suffix or '(no extension)'}; expected one of {expected}"
+        )
+    return suffix
