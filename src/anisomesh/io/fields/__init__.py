@@ -1,0 +1,1 @@
+"""Fields at the points of a mesh, in files: sizes, metrics, solutions."""
