@@ -52,7 +52,7 @@ class RemeshOptions:
     edge_length
         Instead of a number of vertices, which then follows: the length of the edges in the metric, in model units if it
         is ``"curvature"`` (there of edges along the smaller curvature) or ``"uniform"``, and as M measures it if it is
-        tensors.
+        tensors; with tensors alone it is 1.
     size_field
         Lengths of edges in model units, for the metric ``"uniform"``: one for each point of the input (V,), or a
         function of points (n, 3) that returns lengths (n,). Without a number of vertices they are absolute, and the
@@ -189,7 +189,7 @@ class RemeshOptions:
             value = getattr(self, name)
             if value is not None and not (math.isfinite(value) and value > 0.0):
                 raise OptionError(f"{name} = {value}; expected a positive finite number")
-        if self.absolute_length is not None and self.density is not None:
+        if (self.edge_length is not None or self.size_field is not None) and self.density is not None:
             raise OptionError(
                 "a density and an edge_length or size_field both say how large triangles are; leave one out"
             )
@@ -211,9 +211,16 @@ class RemeshOptions:
             raise OptionError(f"min_size = {self.min_size} is above max_size = {self.max_size}")
 
     @property
+    def has_tensors(self) -> bool:
+        """Whether the metric is tensors at the points of the input."""
+        return not isinstance(self.metric, str) and not callable(self.metric)
+
+    @property
     def absolute_length(self) -> float | None:
         """Length in the metric that edges are to have if no number of vertices is given, None if there is none."""
-        return 1.0 if self.size_field is not None else self.edge_length
+        if self.edge_length is None and (self.size_field is not None or self.has_tensors):
+            return 1.0
+        return self.edge_length
 
     def _check_stages(self) -> None:
         """Check metric, embedding and energy, and that they fit each other."""
@@ -267,12 +274,14 @@ def read_target(
 ) -> tuple[int | None, float | None, float | None]:
     """Return the one of the three that is given, as a number in range, and None for the others.
 
-    All are None if the options have an edge length, or a size field and none is given.
+    All are None if the options have an edge length, or a size field or tensors and none is given.
     """
     given = sum(value is not None for value in (n_vertices, ratio, max_error))
-    if given + (options.edge_length is not None) != 1 and (given or options.size_field is None):
+    if given + (options.edge_length is not None) > 1 or not (given or options.absolute_length is not None):
         raise OptionError("give one of n_vertices, ratio, max_error and edge_length")
     if not given:
+        if options.density is not None:
+            raise OptionError("a density has no unit; give n_vertices or ratio beside it")
         return None, None, None
     if n_vertices is not None:
         return whole_number("n_vertices", n_vertices, MIN_VERTICES), None, None

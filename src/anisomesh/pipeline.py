@@ -32,6 +32,7 @@ from anisomesh.io.meshes import mesh_of
 from anisomesh.mesh.surface import Surface
 from anisomesh.mesh.validity import Validity, check_validity
 from anisomesh.metric.conformity import Conformity, MetricExtent, conformity
+from anisomesh.metric.unit_edges import UnitMetric
 from anisomesh.options import MIN_VERTICES, RemeshOptions, read_target, with_overrides
 from anisomesh.resolve import cvt_options, embedding_name
 from anisomesh.result import RemeshResult
@@ -67,8 +68,8 @@ def remesh(
     faces
         Triangles (F, 3), if the first argument is an array of points.
     n_vertices
-        Vertices of the result, at least 4. Without this, ``ratio`` and ``max_error`` the option ``edge_length`` or
-        ``size_field`` says how many.
+        Vertices of the result, at least 4. Without this, ``ratio`` and ``max_error`` the option ``edge_length``,
+        ``size_field`` or ``metric``, if it is tensors, says how many.
     ratio
         Instead of ``n_vertices``: vertices as a share of those of the prepared input.
     max_error
@@ -196,6 +197,12 @@ def _remesh(
             *(() if agreement is None else unfollowed_sizes(agreement)),
         ),
         conformity=agreement,
+        metric=UnitMetric(
+            placed=tasks.sizing,
+            frame=frame,
+            n_vertices=surface.n_points,
+            asked=None if asked is None else asked / unit_of_lengths(measured.options, frame),
+        ),
         feature_distance=made.feature_distance * frame.scale,
     )
 

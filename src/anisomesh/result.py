@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import os
 from dataclasses import dataclass
+from functools import cached_property
 from math import isfinite
 from typing import Any
 
@@ -12,11 +13,13 @@ from anisomesh.attributes.model import Mesh
 from anisomesh.cvt.lbfgs import Status
 from anisomesh.embedding.base import Embedding
 from anisomesh.io.describe import html_table, soundness
+from anisomesh.io.fields.save import save_tensors
 from anisomesh.io.rvd import PolygonMesh, save_polygons
 from anisomesh.mesh.geometry import Frame
 from anisomesh.mesh.surface import Surface
 from anisomesh.mesh.validity import Validity
 from anisomesh.metric.conformity import Conformity
+from anisomesh.metric.unit_edges import UnitMetric, tangent_sizes
 from anisomesh.repair.prepare import PrepareReport
 from anisomesh.voronoi.cells import CellComplex
 from anisomesh.voronoi.diagram import Diagram
@@ -40,8 +43,10 @@ class RemeshResult:
     working
         The surface that was embedded: the prepared input at bounding-box diagonal 1, slivers and long edges
         triangulated anew, noise removed. Its triangles may differ from the triangles of ``prepared``.
+    metric
+        The metric in model units, in which edges have the length 1; see :attr:`unit_tensors`.
     tensors
-        The metric at the points of ``working`` (V, 3, 3), at bounding-box diagonal 1.
+        The metric at the points of ``working`` (V, 3, 3), at bounding-box diagonal 1; only ratios of lengths matter.
     corner_tensors
         The metric at the corners of the faces of ``working`` (F, 3, 3, 3) where it jumps across creases, else None.
     embedding_name
@@ -83,6 +88,7 @@ class RemeshResult:
     prepared: Surface
     prepare_report: PrepareReport
     working: Surface
+    metric: UnitMetric
     tensors: PointTensors
     corner_tensors: CornerTensors | None
     embedding_name: str
@@ -130,6 +136,14 @@ class RemeshResult:
         """The sites of the diagram in the embedding (S, d), sites added for the topology last."""
         return self.cells.diagram.sites
 
+    @cached_property
+    def unit_tensors(self) -> PointTensors:
+        """The metric at the points of ``surface`` (V, 3, 3), in model units: the edges asked for have the length 1.
+
+        If a number of vertices was asked for, it is the one that such edges take.
+        """
+        return self.metric.at_points_of(self.surface)
+
     @property
     def residual(self) -> float:
         """Relative residual of the embedding against the metric; 0 when exact."""
@@ -174,3 +188,24 @@ def save_rvd(result: RemeshResult, path: str | os.PathLike[str]) -> None:
         If the suffix is another one, or the file cannot be written.
     """
     save_polygons(result.polygons(), path)
+
+
+def save_metric(result: RemeshResult, path: str | os.PathLike[str]) -> None:
+    """Write the metric at the points of a result in model units, in which the edges asked for have the length 1.
+
+    Parameters
+    ----------
+    result
+        The result.
+    path
+        A .sol file for Mmg and MEDIT, whose rows belong to the vertices of the result, or a .npy file with an array
+        (V, 3, 3); or a .vtu, .vtp, .ply or .msh file with the result, its tensors ``metric`` (9 components, row by row)
+        and ``sizes`` (V, 2), the smallest and largest length of edges along the surface.
+
+    Raises
+    ------
+    MeshFileError
+        If the suffix is another one, or the file cannot be written.
+    """
+    surface, tensors = result.surface, result.unit_tensors
+    save_tensors(surface, tensors, path, {"sizes": tangent_sizes(surface, tensors)})

@@ -34,7 +34,7 @@ class Outputs:
         The result; :data:`STANDARD_STREAM` for standard output.
     mesh_format
         Its format, if the suffix does not name it.
-    report, rvd, picture
+    report, rvd, metric, picture
         The others.
     """
 
@@ -42,13 +42,20 @@ class Outputs:
     mesh_format: str | None = None
     report: Path | None = None
     rvd: Path | None = None
+    metric: Path | None = None
     picture: Path | None = None
 
     @property
     def paths(self) -> list[Path]:
         """The requested files, in the order of writing, without standard output."""
-        paths = (self.mesh, self.report, self.rvd, self.picture)
+        paths = (self.mesh, *self._others.values())
         return [path for path in paths if path not in (None, STANDARD_STREAM)]
+
+    @property
+    def _others(self) -> dict[str, Path | None]:
+        """The files besides the mesh by their options."""
+        options = ("--report", "--rvd", "--save-metric", "--picture")
+        return dict(zip(options, (self.report, self.rvd, self.metric, self.picture), strict=True))
 
     def check(self, *inputs: Path | None) -> None:
         """Check before a long computation that every file can be written and none replaces an input by accident.
@@ -65,7 +72,9 @@ class Outputs:
         AnisomeshError
             If a picture was requested and nothing can be drawn on this machine.
         """
-        for option, path in (("--report", self.report), ("--rvd", self.rvd), ("--picture", self.picture)):
+        from anisomesh.io.fields.save import TENSOR_FORMATS
+
+        for option, path in self._others.items():
             if path == STANDARD_STREAM:
                 raise typer.BadParameter(f"{option} -: only the mesh goes to standard output; give the name of a file")
         for path in self.paths:
@@ -80,14 +89,15 @@ class Outputs:
             raise typer.BadParameter("-o -: give --output-format, such as ply")
         else:
             check_format(self.mesh.suffix, str(self.mesh))
-        if self.rvd is not None and self.rvd.suffix.lower() not in (".vtu", ".obj"):
-            raise typer.BadParameter(f"--rvd {self.rvd}: expected a file name ending in .vtu or .obj")
+        _check_suffix("--rvd", self.rvd, (".vtu", ".obj"))
+        _check_suffix("--save-metric", self.metric, TENSOR_FORMATS)
         if self.picture is not None:
             check_picture_path(self.picture, "--picture")
 
     def write(self, result: RemeshResult, facts: dict[str, Any], display: Display) -> None:
         """Write the files, each to a temporary file that is renamed when it is complete."""
         from anisomesh.io.meshes import save
+        from anisomesh.result import save_metric, save_rvd
 
         if self.paths:
             display.note(f"writing {', '.join(str(path) for path in self.paths)}")
@@ -95,10 +105,9 @@ class Outputs:
             save(result.mesh, self.mesh, file_format=self.mesh_format)
         if self.report is not None:
             write_json(facts, self.report)
-        if self.rvd is not None:
-            from anisomesh.result import save_rvd
-
-            save_rvd(result, self.rvd)
+        for save_data, path in ((save_rvd, self.rvd), (save_metric, self.metric)):
+            if path is not None:
+                save_data(result, path)
         if self.picture is not None:
             from anisomesh.viz import side_by_side
 
@@ -175,6 +184,12 @@ def refuse_to_overwrite(path: Path, *inputs: Path | None) -> None:
         raise typer.BadParameter(f"{path} is an input and would be overwritten; give another name")
 
 
+def _check_suffix(option: str, path: Path | None, suffixes: tuple[str, ...]) -> None:
+    if path is not None and path.suffix.lower() not in suffixes:
+        expected = f"{', '.join(suffixes[:-1])} or {suffixes[-1]}"
+        raise typer.BadParameter(f"{option} {path}: expected a file name ending in {expected}")
+
+
 def check_picture_path(path: Path, option: str) -> None:
     """Check that a picture can be drawn on this machine and has a supported suffix.
 
@@ -194,8 +209,7 @@ def check_picture_path(path: Path, option: str) -> None:
     """
     from anisomesh.viz import PICTURE_FORMATS, require_renderer
 
-    if path.suffix.lower() not in PICTURE_FORMATS:
-        raise typer.BadParameter(f"{option} {path}: expected a file name ending in {' or '.join(PICTURE_FORMATS)}")
+    _check_suffix(option, path, PICTURE_FORMATS)
     require_renderer()
 
 
@@ -270,7 +284,8 @@ def run_remesh(
     source = RemeshOptions(
         **{name: options[name] for name in ("metric", "embedding", "weights", "fit") if name in options}
     )
-    nearest = source.metric == "approximation" or options.get("max_error") is not None
+    named = isinstance(source.metric, str) and source.metric == "approximation"
+    nearest = named or options.get("max_error") is not None
     works = [
         "remesh",
         *(["fit"] if source.fit else []),

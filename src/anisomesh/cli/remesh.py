@@ -19,6 +19,7 @@ from anisomesh.cli.arguments import (
     target_option,
 )
 from anisomesh.cli.job import STANDARD_STREAM, Outputs, check_input_format, default_output, read_mesh, run_remesh
+from anisomesh.cli.metric_file import MetricFile, check_beside_metric_file, path_of
 from anisomesh.cli.progress import progress
 from anisomesh.cli.report import as_json, hints, summary
 
@@ -28,6 +29,7 @@ _input = partial(typer.Option, rich_help_panel="Input")
 
 @takes_remesh_options(*REMESH_OPTIONS)
 def command(
+    context: typer.Context,
     source: Source,
     n_vertices: Vertices = None,
     ratio: Ratio = None,
@@ -72,6 +74,14 @@ def command(
             help="Weights of the vertices of IN, larger for smaller triangles: a text file, one number per line.",
         ),
     ] = None,
+    metric_file: Annotated[
+        str | None,
+        _input(
+            metavar="FILE[:NAME]",
+            help="Lengths of edges, or metric tensors, at the points of IN, in model units: .sol, .npy, or point data "
+            "of .vtu, .vtp, .ply, .msh. Enough without a number of vertices, which then follows.",
+        ),
+    ] = None,
     weld: Annotated[
         str | None,
         _input(
@@ -83,6 +93,14 @@ def command(
     rvd: Annotated[
         Path | None, _output(metavar="FILE", help="Write the Voronoi cells on the surface: .vtu or .obj.")
     ] = None,
+    save_metric: Annotated[
+        Path | None,
+        _output(
+            metavar="FILE",
+            help="Write the metric at the points of OUT, in which its edges have the length 1: .sol (Mmg), .msh "
+            "(Gmsh), .vtu, .vtp, .ply or .npy.",
+        ),
+    ] = None,
     picture: Annotated[
         Path | None,
         _output(metavar="FILE", help="Draw input and result side by side: .png or .pdf (extra: picture)."),
@@ -91,26 +109,35 @@ def command(
     quiet: Quiet = False,
     **options: Any,
 ) -> None:
-    """Remesh IN with anisotropic triangles. Give -n, --ratio, --max-error or --edge-length; - is standard input."""
-    if (n_vertices, ratio, max_error, edge_length).count(None) != 3:
-        raise typer.BadParameter("give one of -n (number of vertices), --ratio, --max-error and --edge-length")
+    """Remesh IN with anisotropic triangles. Give -n, --ratio, --max-error, --edge-length or --metric-file.
+
+    IN may be -, which is standard input.
+    """
+    targets = 4 - (n_vertices, ratio, max_error, edge_length).count(None)
+    if targets > 1 or (targets == 0 and metric_file is None):
+        raise typer.BadParameter(
+            "give one of -n (number of vertices), --ratio, --max-error and --edge-length, or --metric-file"
+        )
+    if metric_file is not None:
+        check_beside_metric_file(context, edge_length)
     length = None if edge_length is None else Length.parse(edge_length, "--edge-length")
     error = None if max_error is None else Length.parse(max_error, "--max-error")
     gap = None if weld in (None, "auto") else Length.parse(weld, "--weld")
     out = default_output(source, input_format, output_format) if out is None else out
-    outputs = Outputs(mesh=out, mesh_format=output_format, report=report, rvd=rvd, picture=picture)
+    outputs = Outputs(mesh=out, mesh_format=output_format, report=report, rvd=rvd, metric=save_metric, picture=picture)
     to_stdout = out == STANDARD_STREAM
     if to_stdout and json_:
         raise typer.BadParameter("-o - and --json both write to standard output; use --report FILE")
     weights = options.get("weights")
     check_input_format(source, input_format)
-    others = features, density, None if weights is None else Path(weights)
+    others = features, density, None if weights is None else Path(weights), path_of(metric_file)
     outputs.check(None if source == STANDARD_STREAM else source, *others)
     if features is not None or density is not None:
         from anisomesh.io.text_tables import load_numbers, load_pairs
 
         options["features"] = None if features is None else load_pairs(features)
         options["density"] = None if density is None else load_numbers(density)
+    prescribed = None if metric_file is None else MetricFile.read(metric_file)
     with progress(quiet) as display:
         mesh, seconds = read_mesh(source, input_format)
         options |= {"n_vertices": n_vertices, "ratio": ratio}
@@ -118,12 +145,17 @@ def command(
         options["edge_length"] = None if length is None else length.on(mesh.surface)
         if weld is not None:
             options["weld_tolerance"] = "auto" if gap is None else gap.on(mesh.surface)
+        if prescribed is not None:
+            display.note(prescribed.description)
+            options |= prescribed.options_for(mesh.surface, str(source))
         result, facts = run_remesh(mesh, display, name=str(source), load_seconds=seconds, **options)
         facts["hints"] = hints(result.prepared)
         facts["options"] |= {
             "features": None if features is None else str(features),
             "density": None if density is None else str(density),
         }
+        if prescribed is not None:
+            facts["options"] |= {"metric": None, "size_field": None, "metric_file": metric_file}
         outputs.write(result, facts, display)
     if json_:
         typer.echo(as_json(facts))

@@ -76,6 +76,7 @@ def summary(report: dict[str, Any], written: Sequence[Path], notes: Sequence[str
         Changes that the repair made to the input, one line each.
     """
     seconds, stretch = report["seconds"], report["stretch"]
+    file = report["options"].get("metric_file")
     stages = ", ".join(f"{stage} {seconds[stage]:.2f}" for stage in _STAGE_ORDER if stage in seconds)
     energy = "" if report["energy"] is None else f", energy {report['energy']:.4g}"
     rows = [
@@ -88,7 +89,7 @@ def summary(report: dict[str, Any], written: Sequence[Path], notes: Sequence[str
             "stretch",
             f"mean {stretch['mean']:.2f}, largest {stretch['max']:.2f} (of the triangles; 1 = equilateral)",
         ),
-        ("embedding", _METRIC_SOURCES[report["embedding"]]),
+        ("embedding", _METRIC_SOURCES[report["embedding"]] if file is None else f"direct (metric of {file})"),
         ("optimiser", f"{counted(report['iterations'], 'iteration')}{energy}: {report['status']}"),
         ("seconds", f"{seconds['total']:.2f} ({stages})"),
         *(("prepared", note) for note in notes),

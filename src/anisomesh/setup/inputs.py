@@ -92,7 +92,7 @@ def prepared_input(mesh: Mesh, options: RemeshOptions) -> PreparedInput:
     surface = mesh.surface
     prepared = prepare(surface, weld_tolerance=options.weld_tolerance)
     tensors = density = None
-    if not isinstance(options.metric, str) and not callable(options.metric):
+    if options.has_tensors:
         given = _at_prepared("metric", options.metric, (surface.n_points, 3, 3), prepared, MetricError)
         tensors = validate_metric(given, prepared.surface, numbers=prepared.point_source)
     if options.density is not None:

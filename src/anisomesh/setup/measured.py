@@ -88,8 +88,7 @@ def unit_of_lengths(options: RemeshOptions, frame: Frame) -> float:
     A metric that is computed is computed at bounding-box diagonal 1; lengths in prescribed tensors and relative to
     prescribed sizes have no unit.
     """
-    computed = isinstance(options.metric, str) or callable(options.metric)
-    return frame.scale if computed and options.size_field is None else 1.0
+    return 1.0 if options.has_tensors or options.size_field is not None else frame.scale
 
 
 def measure(source: PreparedInput, n: int, options: RemeshOptions, run: Run) -> Measured:

@@ -39,6 +39,8 @@ class Tasks:
         The surface with its metric, and the options with the embedding chosen.
     metric
         The metric on the embedded surface, with what a density adds if sizes are prescribed.
+    sizing
+        The same with what a density adds in any case.
     embedding
         The embedding of that surface.
     dual
@@ -49,6 +51,7 @@ class Tasks:
 
     measured: Measured
     metric: PlacedMetric
+    sizing: PlacedMetric
     embedding: Embedding
     dual: MeshingTask
     fit: FitTarget | None
@@ -81,12 +84,13 @@ def set_up(source: PreparedInput, n: int, options: RemeshOptions, run: Run, *, n
             error_weights=weights,
         )
         plan = fit_plan(options, surface, nearest=nearest)
-        metric = PlacedMetric(ClosestPoints(working), field if weights is None else asked)
+        sizing = PlacedMetric(ClosestPoints(working), asked)
+        metric = replace(sizing, field=field) if weights is None else sizing
         prescribed = bool(source.tagged.any())
         target = None
         if plan is not None:
             target = _fit_target(task, measured.tagged, metric, plan, options, prescribed=prescribed)
-    return Tasks(measured=measured, metric=metric, embedding=embedding, dual=task, fit=target)
+    return Tasks(measured=measured, metric=metric, sizing=sizing, embedding=embedding, dual=task, fit=target)
 
 
 def _with_density(field: MetricField, density: PointScalars | None, surface: Surface) -> MetricField:
