@@ -76,7 +76,7 @@ def summary(report: dict[str, Any], written: Sequence[Path], notes: Sequence[str
         Changes that the repair made to the input, one line each.
     """
     seconds, stretch = report["seconds"], report["stretch"]
-    file = report["options"].get("metric_file")
+    file = report.get("options", {}).get("metric_file")
     stages = ", ".join(f"{stage} {seconds[stage]:.2f}" for stage in _STAGE_ORDER if stage in seconds)
     energy = "" if report["energy"] is None else f", energy {report['energy']:.4g}"
     rows = [
