@@ -142,11 +142,14 @@ def test_files_that_hold_no_field_are_refused(tmp_path):
     np.save(tmp_path / "a.npy", np.array(["a", "b"]))
     (tmp_path / "b.npy").write_bytes(b"no array")
     (tmp_path / "c.npy").write_bytes(b"")
+    with (tmp_path / "d.npy").open("wb") as file:
+        np.savez(file, h=np.ones(N))
     for name, words in {
         "a.mesh": "it has no field at points",
         "a.npy": "none of them can be used",
         "b.npy": "cannot be read as NPY",
         "c.npy": "cannot be read as NPY",
+        "d.npy": "cannot be read as NPY",
         "d.sol": "cannot be read: No such file",
         "a.solb": "binary MEDIT files are not read",
         "a.txt": "unknown format .txt; expected one of .sol, .npy",

@@ -124,7 +124,8 @@ def _data(path: Path) -> tuple[Mapping[str, Array], Points | None]:
         )
     try:
         if suffix == ".npy":
-            return {"array": np.load(path, allow_pickle=False)}, None
+            with path.open("rb") as file:
+                return {"array": np.lib.format.read_array(file, allow_pickle=False)}, None
         return {str(k): values for k, values in enumerate(read_sol(path.read_bytes()), start=1)}, None
     except OSError as error:
         raise MeshFileError(f"{path}: cannot be read: {error.strerror or error}") from error
