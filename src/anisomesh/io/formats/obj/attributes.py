@@ -30,7 +30,7 @@ def take_colours(file: Lines, carried: Carried) -> None:
 
 
 def corner_numbers(lines: list[bytes], face_lines: Integers) -> tuple[Integers, Integers] | None:
-    """Return the numbers of point, texture and normal of corners (n, 3), 0 for none, and the number of corners of faces.
+    """Return the numbers of point, texture and normal of corners (n, 3), 0 for none, and how many corners faces have.
 
     None if they are not all written alike, as 1, 1/2, 1//3 or 1/2/3, or if anything else is there.
     """
