@@ -146,5 +146,6 @@ def _custom(name: str, rows: Array) -> Encoded | None:
     elif kind not in COMPONENTS.values() or kind == "u4":  # u4 is for indices only
         if rows.dtype.kind in "iu" and (rows.min() < -_LARGEST_IN_FLOAT32 or rows.max() > _LARGEST_IN_FLOAT32):
             return None
-        rows = rows.astype(np.float32)
+        with np.errstate(over="ignore"):
+            rows = rows.astype(np.float32)
     return Encoded("_" + name, rows, False) if np.isfinite(rows).all() else None
