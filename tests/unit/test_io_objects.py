@@ -220,3 +220,14 @@ def test_textures_of_vtp_are_seen_by_vtk_and_read_back(tmp_path):
     assert_same(load_mesh(tmp_path / "a.vtp"), FULL)
     data.save(tmp_path / "b.vtp")  # as VTK writes it
     assert_same(load_mesh(tmp_path / "b.vtp"), FULL)
+
+
+def test_blocks_keep_their_names_whatever_their_number(caplog):
+    pyvista = pytest.importorskip("pyvista")
+    one = pyvista.PolyData.from_regular_faces(SURFACE.points, SURFACE.faces[:1])
+    many = pyvista.MultiBlock({f"part {k}": one.translate((k, 0, 0)) for k in range(20)})
+    regions = mesh_of(many).regions["block"]
+    assert [regions.names[label] for label in regions.labels] == [f"part {k}" for k in range(20)]
+    one.cell_data["block"] = [7]
+    assert mesh_of(pyvista.MultiBlock({"a": one, "b": one})).regions["block"].names == {}
+    assert "left out the names of its blocks, whose cells have data 'block'" in caplog.text

@@ -10,6 +10,7 @@ import numpy as np
 
 from anisomesh.io.carried import Array, Carried, Division, Integers
 from anisomesh.io.cells import Shape, SurfaceCells
+from anisomesh.io.formats.vtk.data import NAMES_OF_REGIONS
 from anisomesh.io.formats.vtk.pieces import Piece, Pieces
 from anisomesh.io.objects.trimesh_scenes import scene_soup
 from anisomesh.io.polygons import PolygonSoup
@@ -60,8 +61,12 @@ def polygon_soup(mesh: Any) -> PolygonSoup | None:
 
 def _from_vtk(mesh: Any) -> PolygonSoup:
     """Return a data set of PyVista, or all data sets in blocks of blocks."""
-    pieces, remarks, fields, names = Pieces(), [], dict[str, Array](), dict[int, str]()
-    for name, block in _blocks(mesh):
+    pieces, remarks, fields, blocks = Pieces(), list[str](), dict[str, Array](), list(_blocks(mesh))
+    numbered = hasattr(mesh, "n_blocks")
+    if numbered and any(BLOCK in getattr(block, "cell_data", {}) for _, block in blocks):
+        numbered = False
+        pieces.carried.remarks.append(f"left out the names of its blocks, whose cells have data {BLOCK!r}")
+    for number, (_, block) in enumerate(blocks):
         if not hasattr(block, "cast_to_unstructured_grid"):
             remarks.append(f"left out a block of type {type(block).__name__}, which has no cells")
             continue
@@ -71,20 +76,17 @@ def _from_vtk(mesh: Any) -> PolygonSoup:
             "Normals": point_data.active_normals_name or "",
             "GlobalIds": getattr(point_data.GetGlobalIds(), "GetName", str)(),
         }
-        cell_data = _arrays(grid.cell_data)
-        if hasattr(mesh, "n_blocks") and BLOCK not in cell_data:
-            cell_data[BLOCK] = np.full(grid.n_cells, len(names))
-        names[len(names)] = name
+        cell_data = _arrays(grid.cell_data) | ({BLOCK: np.full(grid.n_cells, number)} if numbered else {})
         offsets = grid.cell_offsets if hasattr(grid, "cell_offsets") else grid.offset  # older versions
         cells = np.asarray(grid.celltypes), np.asarray(grid.cell_connectivity), np.asarray(offsets)[1:]
         pieces.add(Piece(np.asarray(grid.points), *cells, _arrays(grid.point_data), cell_data, active))
         for key, values in _arrays(block.field_data).items():
             if not np.array_equal(fields.setdefault(key, values), values):
                 pieces.carried.remarks.append(f"left out field data {key!r} of further blocks")
-    soup = pieces.soup({**fields, **_arrays(mesh.field_data)}, tuple(remarks))
-    if BLOCK in soup.carried.divisions and hasattr(mesh, "n_blocks"):
-        soup.carried.divisions[BLOCK].names |= {label: name for label, name in names.items() if name}
-    return soup
+    if numbered:
+        text = "\n".join(f"{k} {' '.join(name.split())}" for k, (name, _) in enumerate(blocks))
+        fields[NAMES_OF_REGIONS + BLOCK] = np.frombuffer(text.encode(), np.uint8)
+    return pieces.soup({**fields, **_arrays(mesh.field_data)}, tuple(remarks))
 
 
 def _blocks(mesh: Any, name: str = "") -> Iterator[tuple[str, Any]]:
@@ -139,7 +141,8 @@ def _carry_meshio(mesh: Any, carried: Carried) -> None:
         with carried.optional(f"the set of points {name!r}"):
             is_in = np.zeros(len(mesh.points), dtype=bool)
             is_in[np.asarray(chosen, dtype=np.int64)] = True
-            carried.point_data.setdefault(name, is_in)
+            if carried.point_data.setdefault(name, is_in) is not is_in:
+                raise ValueError("point data have its name")
     first = np.cumsum([0, *(len(block.data) for block in mesh.cells)])
     for name, blocks in mesh.cell_sets.items():
         with carried.optional(f"the set of cells {name!r}"):
