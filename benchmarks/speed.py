@@ -96,7 +96,7 @@ def whole_run(n: int, ratio: float) -> dict[str, float]:
 
 
 def share_of_attributes(n: int) -> tuple[float, float]:
-    """Return the seconds that carrying over data of all kinds takes, and those of the whole remesh to n points."""
+    """Return the seconds that a remesh to n points takes to carry over data of all kinds, and in all."""
     surface = ring(20_000)
     corners = surface.points[surface.faces]
     centres = corners.mean(axis=1)

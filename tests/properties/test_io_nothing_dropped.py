@@ -70,6 +70,7 @@ def divisions():
 
 MATERIALS = {
     "own": object(),
+    "trimesh": "not a table of materials",
     "unit": "inch",
     "field_data": {"time": np.array([0.5])},
     "gltf": {"materials": [{"name": "red"}, {"name": "blue"}]},

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import io
 import logging
+from collections.abc import Mapping
 from importlib import import_module
 from typing import Any
 
@@ -129,7 +130,8 @@ def to_trimesh(mesh: Mesh) -> Any:
     nodes, materials, table = mesh.regions.get(NODE), mesh.regions.get(MATERIAL), _trimesh_materials(mesh)
     others = [name for name in mesh.regions if name not in (NODE, MATERIAL)]
     losses.names_of_regions(mesh, *others)
-    losses.add("materials", *(name for name in mesh.materials if name not in (TRIMESH, "gltf", "unit")))
+    held = ["unit", *(name for name in (TRIMESH, "gltf") if isinstance(mesh.materials.get(name), Mapping))]
+    losses.add("materials", *(name for name in mesh.materials if name not in held))
     none = np.zeros(mesh.surface.n_faces, dtype=np.int64)
     scene = trimesh.Scene()
     for (node, material), faces in by_label(*(none if d is None else d.labels for d in (nodes, materials))):
@@ -140,7 +142,7 @@ def to_trimesh(mesh: Mesh) -> Any:
     _warn("trimesh", losses)
     is_scene = len(scene.geometry) > 1 or nodes is not None
     found = scene if is_scene else next(iter(scene.geometry.values()))
-    if "unit" in mesh.materials:
+    if isinstance(mesh.materials.get("unit"), str):
         found.units = mesh.materials["unit"]
     return found
 
@@ -148,10 +150,12 @@ def to_trimesh(mesh: Mesh) -> Any:
 def _trimesh_materials(mesh: Mesh) -> dict[int, Any]:
     """Return the materials of trimesh by their labels."""
     trimesh: Any = import_module("trimesh")
-    given = mesh.materials.get("gltf", {})
-    count = len(given.get("materials", []))
-    if TRIMESH in mesh.materials or count == 0:
-        return dict(mesh.materials.get(TRIMESH, {}))
+    theirs, given = mesh.materials.get(TRIMESH), mesh.materials.get("gltf")
+    if isinstance(theirs, Mapping):
+        return dict(theirs)
+    count = len(given.get("materials", [])) if isinstance(given, Mapping) else 0
+    if count == 0:
+        return {}
     each = Regions(np.arange(count), {k: str(k) for k in range(count)})
     one_face_each = Mesh(
         surface=Surface(np.tile(np.eye(3), (count, 1)), np.arange(3 * count).reshape(-1, 3)),

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+from collections.abc import Mapping
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -49,12 +50,14 @@ def glb_bytes(mesh: Mesh, losses: Losses) -> bytes:
         raise ValueError("coordinates beyond 3.4e38 do not fit the float32 of GLB; use PLY instead")
     nodes, materials, names = _divisions(mesh, losses)
     losses.add("face data", *mesh.face_data)
-    losses.add("materials", *(name for name in mesh.materials if name not in ("gltf", TRIMESH)))
+    theirs = mesh.materials.get(TRIMESH)
+    held = ("gltf", TRIMESH) if isinstance(theirs, Mapping) else ("gltf",)
+    losses.add("materials", *(name for name in mesh.materials if name not in held))
     losses.features(mesh)
     writer, attributes = _Writer(), _attributes(mesh, losses)
     given = mesh.materials.get("gltf")
-    if given is None and TRIMESH in mesh.materials:
-        given = materials_as_gltf(mesh.materials[TRIMESH])
+    if given is None and isinstance(theirs, Mapping):
+        given = materials_as_gltf(theirs)
     given = given if isinstance(given, dict) else {}
     count = len(given.get("materials", []))
     labels = [np.zeros(mesh.surface.n_faces, dtype=np.int64) if d is None else d.labels for d in (nodes, materials)]

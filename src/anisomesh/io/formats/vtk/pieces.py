@@ -111,10 +111,11 @@ class Pieces:
             remarks += (f"left out {count} cell(s) marked as {what}",) if count else ()
         soup = self._cells.soup(np.concatenate(self._points), remarks, carried)
         numbers = carried.point_data.get(self._numbers)
+        if numbers is None or numbers.dtype.kind not in "iu" or len(np.unique(numbers)) == len(numbers):
+            return soup
         if self._numbers == ORIGINAL_POINT:
-            carried.point_data.pop(ORIGINAL_POINT, None)
-        is_repeated = numbers is not None and numbers.dtype.kind in "iu" and len(np.unique(numbers)) < len(numbers)
-        return _joined(soup, numbers) if numbers is not None and is_repeated else soup
+            del carried.point_data[ORIGINAL_POINT]
+        return _joined(soup, numbers)
 
 
 def _shifted(connectivity: Array, first: int, count: int) -> Integers:
