@@ -35,6 +35,18 @@ def test_a_mesh_has_the_methods_and_is_not_changed(ball):
     assert evaluation.as_dict() == anisomesh.evaluate(ball, expected, samples=500, seed=1).as_dict()
 
 
+def test_the_result_has_the_data_of_the_mesh(ball):
+    given = ball.copy()
+    given.point_data["height"] = given.points[:, 2]
+    given.cell_data["side"] = (given.cell_centers().points[:, 2] > 0).astype(int)
+    given.field_data["title"] = ["a ball"]
+    remeshed = given.anisomesh.remesh(60, **FEW)
+    np.testing.assert_allclose(remeshed.point_data["height"], remeshed.points[:, 2], atol=0.05)
+    assert set(np.unique(remeshed.cell_data["side"])) == {0, 1}
+    assert remeshed.field_data["title"].tolist() == ["a ball"]
+    assert remeshed.active_normals is not None
+
+
 def test_other_targets_and_grids(ball):
     assert ball.anisomesh.remesh(ratio=0.2, **FEW).n_points == round(0.2 * ball.n_points)
     assert ball.cast_to_unstructured_grid().anisomesh.remesh(50, **FEW).n_points == 50

@@ -129,5 +129,6 @@ def separate_columns(data: dict[str, Array]) -> dict[str, Array]:
             columns[name] = values
         else:
             rows = values.reshape(len(values), -1)
-            columns |= {f"{name}_{k}": rows[:, k] for k in range(rows.shape[1])}
+            alone = rows.shape[1] == 1
+            columns |= {name if alone else f"{name}_{k}": rows[:, k] for k in range(rows.shape[1])}
     return columns

@@ -3,11 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from dataclasses import replace
 
 import numpy as np
 
 from anisomesh.attributes.model import Mesh, Regions
 from anisomesh.io.carried import Array, Integers
+from anisomesh.mesh.surface import Surface
 
 _PREFERRED = ("physical", "material", "group", "object", "solid", "node", "reference")  # divisions, if one is kept
 
@@ -107,6 +109,47 @@ def continuous_corner_data(mesh: Mesh, losses: Losses) -> dict[str, Array]:
         else:
             losses.add("corner data", name)
     return kept
+
+
+def distinct_corners(mesh: Mesh, chosen: Integers) -> tuple[Integers, Integers]:
+    """Return the first corner ``3 f + c`` (n,) of each combination of a point and corner data in some faces.
+
+    The second array is the number of the combination at each corner of these faces (m, 3). Combinations are in the
+    order of their points.
+    """
+    corners = (3 * chosen[:, None] + np.arange(3)).ravel()
+    columns = [mesh.surface.faces.astype(np.int64).ravel()[corners]]
+    for values in mesh.corner_data.values():
+        rows = values.reshape(mesh.surface.faces.size, -1)[corners]
+        columns.append(np.unique(rows, axis=0, return_inverse=True)[1].reshape(-1))
+    _, first, number = np.unique(np.stack(columns, axis=1), axis=0, return_index=True, return_inverse=True)
+    return corners[first], number.reshape(-1, 3).astype(np.int64)
+
+
+def with_points_repeated(mesh: Mesh) -> tuple[Mesh, Integers]:
+    """Return a mesh whose corner data are point data, since points are repeated where these differ.
+
+    The second array is the point of the given mesh that each point is (V',). The points that there were come first, in
+    their order, and features refer to them.
+    """
+    joined = continuous_corner_data(mesh, Losses())
+    apart = {name: values for name, values in mesh.corner_data.items() if name not in joined}
+    mesh = replace(mesh, point_data={**mesh.point_data, **joined}, corner_data=apart)
+    own, faces = mesh.surface, mesh.surface.faces.astype(np.int64)
+    if not apart:
+        return mesh, np.arange(own.n_points)
+    corners, numbers = distinct_corners(mesh, np.arange(own.n_faces))
+    points = faces.ravel()[corners]
+    is_first = np.diff(points, prepend=-1) > 0
+    place = np.where(is_first, points, own.n_points - 1 + np.cumsum(~is_first))
+    source = np.concatenate([np.arange(own.n_points), points[~is_first]])
+    point_data = {name: values[source] for name, values in mesh.point_data.items()}
+    for name, values in apart.items():
+        rows = values.reshape(faces.size, *values.shape[2:])
+        point_data[name] = np.zeros((len(source), *values.shape[2:]), dtype=values.dtype)
+        point_data[name][place] = rows[corners]
+    surface = Surface(own.points[source], place[numbers])
+    return replace(mesh, surface=surface, point_data=point_data, corner_data={}), source
 
 
 def name_of(regions: Regions, label: int, otherwise: str = "") -> str:

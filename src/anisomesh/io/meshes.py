@@ -17,7 +17,7 @@ from anisomesh.errors import MeshError, MeshFileError
 from anisomesh.io import material_files
 from anisomesh.io.assemble import as_mesh
 from anisomesh.io.atomic import atomic_path
-from anisomesh.io.convert import as_surface
+from anisomesh.io.convert import from_object
 from anisomesh.io.formats.words import BYTE_ORDER_MARK
 from anisomesh.io.holding import Losses
 from anisomesh.io.known_formats import READERS, TEXT_FORMATS, WRITERS, known_suffix
@@ -136,7 +136,7 @@ def mesh_of(mesh: Any, faces: npt.NDArray[Any] | None = None) -> Mesh:
         If the object is not a mesh, or there are faces besides a file.
     """
     if not isinstance(mesh, str | os.PathLike | Mesh):
-        return Mesh(surface=as_surface(mesh, faces))
+        return from_object(mesh, faces)
     if faces is not None:
         what = "a Mesh" if isinstance(mesh, Mesh) else f"the file {os.fspath(mesh)}"
         raise MeshError(f"the mesh is {what} and has faces; leave out the second argument")
@@ -201,7 +201,7 @@ def save(
     """
     stream: Any = path if not isinstance(path, str | os.PathLike) and hasattr(path, "write") else None
     name = str(_as_path(path)) if stream is None else _stream_name(stream)
-    mesh = mesh if isinstance(mesh, Mesh) else Mesh(surface=as_surface(mesh))
+    mesh = mesh if isinstance(mesh, Mesh) else from_object(mesh)
     suffix = known_suffix(name, file_format)
     if point_data:
         mesh = _with_point_data(mesh, name, point_data)

@@ -6,16 +6,14 @@ PyVista 0.48 and newer finds the module by the entry point ``pyvista.accessors``
 from __future__ import annotations
 
 import logging
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import pyvista
 
 from anisomesh.evaluation.report import Evaluation
 from anisomesh.evaluation.report import evaluate as evaluate_meshes
+from anisomesh.io.objects.write import to_pyvista
 from anisomesh.pipeline import remesh as remesh_mesh
-
-if TYPE_CHECKING:
-    from anisomesh.mesh.surface import Surface
 
 logger = logging.getLogger(__name__)
 
@@ -33,7 +31,7 @@ class Accessor:
         self._mesh = mesh
 
     def remesh(self, n_vertices: int | None = None, **options: Any) -> Any:
-        """Return the mesh remeshed anisotropically, without its point and cell data.
+        """Return the mesh remeshed anisotropically, with its point, cell and field data.
 
         Parameters
         ----------
@@ -45,8 +43,8 @@ class Accessor:
         Returns
         -------
         pyvista.PolyData
-            The result. What a user should know about it is logged as warnings;
-            :func:`~anisomesh.pipeline.remesh` takes the mesh as well and returns everything else too.
+            The result, as :func:`~anisomesh.io.objects.write.to_pyvista` makes it. What a user should know about it is
+            logged as warnings; :func:`~anisomesh.pipeline.remesh` takes the mesh as well and returns everything else.
 
         Raises
         ------
@@ -56,7 +54,7 @@ class Accessor:
         result = remesh_mesh(self._mesh, n_vertices=n_vertices, **options)
         for text in result.warnings:
             logger.warning("%s", text)
-        return _poly_data(result.surface)
+        return to_pyvista(result.mesh)
 
     def evaluate(self, result: Any, **options: Any) -> Evaluation:
         """Measure a remesh against this mesh.
@@ -69,10 +67,6 @@ class Accessor:
             The other arguments of :func:`anisomesh.evaluation.report.evaluate`.
         """
         return evaluate_meshes(self._mesh, result, **options)
-
-
-def _poly_data(surface: Surface) -> Any:
-    return pyvista.PolyData.from_regular_faces(surface.points, surface.faces)
 
 
 for _kind in (pyvista.PolyData, pyvista.UnstructuredGrid):

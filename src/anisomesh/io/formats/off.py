@@ -37,7 +37,7 @@ def read_off(data: bytes) -> PolygonSoup:
         raise ValueError(
             f"truncated: it declares {n_points} points and {n_faces} faces but {len(lines) - start} lines follow"
         )
-    points = coordinates(lines, np.arange(start, start + n_points), skip=0, numbers=numbers)
+    points = coordinates(lines, np.arange(start, start + n_points), numbers=numbers)
     face_lines = np.arange(start + n_points, start + n_points + n_faces)
     tokens = [lines[k].split() for k in face_lines]
     sizes = integers([row[:1] for row in tokens], numbers[face_lines])

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import re
+import warnings
 from collections.abc import Iterable
 from typing import Any
 
@@ -12,13 +13,61 @@ import numpy.typing as npt
 from anisomesh.io.polygons import Integers
 
 BYTE_ORDER_MARK = b"\xef\xbb\xbf"  # of UTF-8
+LINES_AT_ONCE = 100_000
+"""Lines that are parsed at once, which limits memory."""
+
+_SPACE = ord(" ")  # codes up to it are white space, or make numbers malformed
 _LARGEST_WHOLE = 2.0**53  # beyond it, not every integer has a float64
 
 
+def quick_numbers(text: bytes, dtype: type) -> npt.NDArray[Any] | None:
+    """Return the numbers in a text, which only white space or a sign need be between; None if there is anything else.
+
+    What is None is for the slow way, word by word, that names the line.
+    """
+    with warnings.catch_warnings():
+        warnings.simplefilter("error", DeprecationWarning)  # what NumPy raises at the first other character
+        try:
+            return np.fromstring(text, dtype=dtype, sep=" ")
+        except (DeprecationWarning, ValueError):
+            return None
+
+
+def word_starts(text: bytes) -> Integers:
+    """Return where the words of a text begin."""
+    is_space = np.frombuffer(text, dtype=np.uint8) <= _SPACE
+    return np.flatnonzero(np.diff(is_space.astype(np.int8), prepend=1) == -1)
+
+
+def quick_table(lines: list[bytes], chosen: Integers, word: bytes = b"") -> npt.NDArray[np.float64] | None:
+    """Return the numbers (n, k) of lines behind a first word; None if they are not equally many or there is more."""
+    parts = []
+    for first in range(0, len(chosen), LINES_AT_ONCE):
+        rows = chosen[first : first + LINES_AT_ONCE].tolist()
+        text = b"\n".join([lines[k] for k in rows])
+        if any(text.count(bytes([letter])) != word.count(letter) * len(rows) for letter in set(word)):
+            return None
+        text = text.translate(bytes.maketrans(word, b" " * len(word)))
+        values, starts = quick_numbers(text, np.float64), word_starts(text)
+        if values is None or len(values) != len(starts) or len(values) % len(rows):
+            return None
+        ends = np.flatnonzero(np.frombuffer(text, dtype=np.uint8) == ord("\n"))
+        width = len(values) // len(rows)
+        if (np.searchsorted(starts, ends) != width * np.arange(1, len(rows))).any():
+            return None
+        parts.append(values.reshape(len(rows), width))
+    widths = {part.shape[1] for part in parts}
+    return np.concatenate(parts) if len(widths) == 1 else None
+
+
 def coordinates(
-    lines: list[bytes], chosen: Integers, *, skip: int, numbers: Integers | None = None
+    lines: list[bytes], chosen: Integers, *, word: bytes = b"", numbers: Integers | None = None
 ) -> npt.NDArray[np.float64]:
-    """Parse three coordinates (n, 3) after ``skip`` words of the chosen lines; ``numbers`` are the line numbers."""
+    """Parse three coordinates (n, 3) behind a word in the chosen lines; ``numbers`` are the line numbers."""
+    table = quick_table(lines, chosen, word)
+    if table is not None and table.shape[1] >= 3:
+        return table[:, :3].copy()
+    skip = len(word.split())
     rows = [lines[k].partition(b"#")[0].split()[skip : skip + 3] for k in chosen]
     try:
         return np.array([list(map(float, row)) for row in rows], dtype=np.float64).reshape(len(rows), 3)

@@ -65,8 +65,8 @@ class Attributes:
         """Add the attributes of a number of vertices."""
         self._parts.append((count, attributes))
 
-    def together(self, carried: Carried) -> dict[str, Array]:
-        """Return all attributes; where vertices lack one they are white, have 0 or NaN, or it is left out."""
+    def together(self, carried: Carried, of: str = "vertices") -> dict[str, Array]:
+        """Return all attributes; where vertices or faces lack one they are white, have 0 or NaN, or it is left out."""
         data: dict[str, Array] = {}
         filled: list[str] = []
         for name in dict.fromkeys(name for _, attributes in self._parts for name in attributes):
@@ -81,7 +81,7 @@ class Attributes:
             if lacks:
                 filled.append(name)
         if filled:
-            carried.remarks.append(f"vertices of its meshes without {', '.join(filled)} get 0, NaN or white")
+            carried.remarks.append(f"{of} of its meshes without {', '.join(filled)} get 0, NaN or white")
         return data
 
     def _filled(self, name: str, example: Array) -> Array:
@@ -146,5 +146,6 @@ def _custom(name: str, rows: Array) -> Encoded | None:
     elif kind not in COMPONENTS.values() or kind == "u4":  # u4 is for indices only
         if rows.dtype.kind in "iu" and (rows.min() < -_LARGEST_IN_FLOAT32 or rows.max() > _LARGEST_IN_FLOAT32):
             return None
-        rows = rows.astype(np.float32)
+        with np.errstate(over="ignore"):
+            rows = rows.astype(np.float32)
     return Encoded("_" + name, rows, False) if np.isfinite(rows).all() else None

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+from collections.abc import Mapping
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -13,7 +14,8 @@ from anisomesh.io.formats.gltf.attributes import Encoded, encoded
 from anisomesh.io.formats.gltf.document import BINARY_CHUNK, COMPONENTS, JSON_CHUNK, WIDTHS
 from anisomesh.io.formats.gltf.materials import write_materials
 from anisomesh.io.formats.gltf.read import MATERIAL, NODE, TRIANGLES
-from anisomesh.io.holding import Losses, by_label, main_division, name_of
+from anisomesh.io.holding import Losses, by_label, distinct_corners, main_division, name_of
+from anisomesh.io.objects.trimesh_scenes import TRIMESH, materials_as_gltf
 
 _ALIGNMENT = 4  # bytes
 _ELEMENT_ARRAY, _ARRAY = 34963, 34962  # targets of views
@@ -48,10 +50,14 @@ def glb_bytes(mesh: Mesh, losses: Losses) -> bytes:
         raise ValueError("coordinates beyond 3.4e38 do not fit the float32 of GLB; use PLY instead")
     nodes, materials, names = _divisions(mesh, losses)
     losses.add("face data", *mesh.face_data)
-    losses.add("materials", *(name for name in mesh.materials if name != "gltf"))
+    theirs = mesh.materials.get(TRIMESH)
+    held = ("gltf", TRIMESH) if isinstance(theirs, Mapping) else ("gltf",)
+    losses.add("materials", *(name for name in mesh.materials if name not in held))
     losses.features(mesh)
     writer, attributes = _Writer(), _attributes(mesh, losses)
     given = mesh.materials.get("gltf")
+    if given is None and isinstance(theirs, Mapping):
+        given = materials_as_gltf(theirs)
     given = given if isinstance(given, dict) else {}
     count = len(given.get("materials", []))
     labels = [np.zeros(mesh.surface.n_faces, dtype=np.int64) if d is None else d.labels for d in (nodes, materials)]
@@ -101,13 +107,8 @@ def _vertices(mesh: Mesh, chosen: Integers) -> _Vertices:
         corners = np.zeros(mesh.surface.n_points, dtype=np.int64)
         corners[faces.ravel()] = np.arange(faces.size)
         return _Vertices(np.arange(mesh.surface.n_points), corners, faces)
-    corners = (3 * chosen[:, None] + np.arange(3)).ravel()
-    columns = [faces.ravel()[corners]]
-    for values in mesh.corner_data.values():
-        rows = values.reshape(faces.size, -1)[corners]
-        columns.append(np.unique(rows, axis=0, return_inverse=True)[1].reshape(-1))
-    _, first, vertex = np.unique(np.stack(columns, axis=1), axis=0, return_index=True, return_inverse=True)
-    return _Vertices(columns[0][first], corners[first], vertex.reshape(-1, 3).astype(np.int64))
+    corners, numbers = distinct_corners(mesh, chosen)
+    return _Vertices(faces.ravel()[corners], corners, numbers)
 
 
 def _attributes(mesh: Mesh, losses: Losses) -> list[_Attribute]:

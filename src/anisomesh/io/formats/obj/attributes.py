@@ -4,8 +4,9 @@ from __future__ import annotations
 
 import numpy as np
 
-from anisomesh.io.carried import COLOUR, NORMAL, UV, Carried, Integers
+from anisomesh.io.carried import COLOUR, NORMAL, UV, Array, Carried, Integers
 from anisomesh.io.formats.obj.lines import Lines
+from anisomesh.io.formats.words import LINES_AT_ONCE, quick_numbers, word_starts
 
 SMOOTHING = "smoothing_group"
 """Name of the smoothing groups (``s``) as face data."""
@@ -28,16 +29,44 @@ def take_colours(file: Lines, carried: Carried) -> None:
             carried.point_data[COLOUR] = rows[:, 3:7]
 
 
-def corner_numbers(words: list[bytes]) -> Integers | None:
-    """Return the numbers of point, texture and normal of corners (n, 3), if all are written as 1/2/3."""
-    text = b" ".join(words)
-    if text.count(b"/") != 2 * len(words) or any(word.count(b"/") != 2 for word in words):
+def corner_numbers(lines: list[bytes], face_lines: Integers) -> tuple[Integers, Integers] | None:
+    """Return the numbers of point, texture and normal of corners (n, 3), 0 for none, and how many corners faces have.
+
+    None if they are not all written alike, as 1, 1/2, 1//3 or 1/2/3, or if anything else is there.
+    """
+    tables, sizes = [np.zeros((0, 3), dtype=np.int64)], [np.zeros(0, dtype=np.int64)]
+    for first in range(0, len(face_lines), LINES_AT_ONCE):
+        rows = face_lines[first : first + LINES_AT_ONCE].tolist()
+        text = b"\n".join([lines[k] for k in rows])
+        if text.count(b"f") != len(rows):
+            return None
+        text = text.replace(b"f", b" ")
+        starts, codes = word_starts(text), np.frombuffer(text + b" ", dtype=np.uint8)
+        columns = _columns_of(text, codes, starts)
+        numbers = None if columns is None else quick_numbers(text.replace(b"/", b" "), np.int64)
+        if columns is None or numbers is None or len(numbers) != len(columns) * len(starts):
+            return None
+        tables.append(np.zeros((len(starts), 3), dtype=np.int64))
+        tables[-1][:, columns] = numbers.reshape(-1, len(columns))
+        ends = np.append(np.flatnonzero(codes == ord("\n")), len(codes))
+        sizes.append(np.diff(np.searchsorted(starts, ends), prepend=0))
+    return np.concatenate(tables), np.concatenate(sizes)
+
+
+def _columns_of(text: bytes, codes: Array, starts: Integers) -> list[int] | None:
+    """Return which of point, texture and normal all words of a text give; None if they differ."""
+    slashes = np.flatnonzero(codes == ord("/"))
+    n_words = len(starts)
+    per_word = len(slashes) // max(n_words, 1)
+    at_end = (codes[slashes - 1] <= ord(" ")) | (codes[slashes + 1] <= ord(" "))
+    if per_word > 2 or at_end.any() or len(slashes) != per_word * n_words:
         return None
-    try:
-        numbers = np.array(list(map(int, text.replace(b"/", b" ").split())), dtype=np.int64)
-    except (ValueError, OverflowError):
+    if (np.searchsorted(slashes, starts) != per_word * np.arange(n_words)).any():
         return None
-    return numbers.reshape(-1, 3) if numbers.size == 3 * len(words) else None
+    n_empty = text.count(b"//")
+    if n_empty == 0:
+        return [0, 1, 2][: per_word + 1]
+    return [0, 2] if n_empty == n_words and per_word == 2 else None
 
 
 def take_corner_data(file: Lines, words: list[list[bytes]] | Integers, sizes: Integers, carried: Carried) -> None:

@@ -8,6 +8,7 @@ import numpy as np
 import numpy.typing as npt
 
 from anisomesh.io.carried import Integers
+from anisomesh.io.formats.words import quick_table
 
 
 @dataclass(frozen=True, eq=False)
@@ -19,7 +20,7 @@ class Lines:
     lines
         All lines.
     kinds
-        Their first two letters.
+        Their first three letters, with a space behind a shorter word.
     point_lines, face_lines
         The numbers of the lines of points and of faces.
     """
@@ -31,10 +32,11 @@ class Lines:
 
     def of(self, word: bytes) -> Integers:
         """Return the numbers of the lines that begin with a word."""
-        place = np.flatnonzero((self.kinds == (word + b" ")[:2]) | (self.kinds == word[:2]))
-        n, after = len(word), b" \t"
-        found = [k for k in place.tolist() if (line := self.lines[k].lstrip())[:n] == word and line[n : n + 1] in after]
-        return np.array(found, dtype=np.int64)
+        if len(word) < 3:
+            begin = self.kinds.astype(f"S{len(word) + 1}")
+            return np.flatnonzero((begin == word + b" ") | (self.kinds == word))
+        place = np.flatnonzero(self.kinds == word[:3])
+        return np.array([k for k in place.tolist() if self.lines[k].split(None, 1)[0] == word], dtype=np.int64)
 
     def rest(self, number: int) -> str:
         """Return what follows the first word of a line; names may have a # in them, as in files of 3ds Max."""
@@ -43,6 +45,9 @@ class Lines:
 
     def numbers(self, chosen: Integers) -> npt.NDArray[np.float64]:
         """Return the numbers of some lines (n, k), as many as the shortest of them has."""
+        table = quick_table(self.lines, chosen, self.lines[chosen[0]].split(None, 1)[0])
+        if table is not None:
+            return table
         rows = [self.lines[k].partition(b"#")[0].split() for k in chosen]
         width = min(map(len, rows)) - 1
         table = np.array([float(word) for row in rows for word in row[1 : 1 + width]], dtype=np.float64)

@@ -33,30 +33,48 @@ def read_obj(data: bytes) -> PolygonSoup:
     and points (``p``) fixed points. Free-form surfaces are left out, with a remark.
     """
     lines = re.sub(rb"\\\r?\n", b" ", data).splitlines()
-    kinds = np.array([line[:2].replace(b"\t", b" ") for line in map(bytes.lstrip, lines)], dtype="S2")
-    point_lines = np.flatnonzero(kinds == b"v ")
-    is_face = kinds == b"f "
-    for k in np.flatnonzero(kinds == b"fo"):
+    kinds = _kinds(lines)
+    two_letters = kinds.astype("S2")
+    point_lines = np.flatnonzero(two_letters == b"v ")
+    is_face = two_letters == b"f "
+    for k in np.flatnonzero(two_letters == b"fo"):
         is_face[k] = lines[k].split(None, 1)[0] == b"fo"  # in files of version 2
     face_lines = np.flatnonzero(is_face)
     truncated = np.flatnonzero((kinds == b"v") | (kinds == b"f"))
     if len(truncated):
         raise ValueError(f"line {truncated[0] + 1} is cut off: {lines[truncated[0]][:40]!r}")
-    points = coordinates(lines, point_lines, skip=1)
-    words = [lines[k].partition(b"#")[0].split()[1:] for k in face_lines]
-    sizes = np.array([len(row) for row in words], dtype=np.int64)
+    points = coordinates(lines, point_lines, word=b"v")
+    words, sizes = _corners(lines, face_lines)
     if len(sizes) and sizes[-1] < 3 and face_lines[-1] == len(lines) - 1 and not data.endswith(_ENDS_OF_LINES):
         raise ValueError(f"truncated: the last line is a face of {sizes[-1]} corners: {lines[-1][:40]!r}")
-    numbers = corner_numbers([word for row in words for word in row])
-    corners = _point_indices(words if numbers is None else numbers, face_lines, sizes, point_lines)
-    curved = [line.split(None, 1)[0].decode() for line in lines if line.startswith(_CURVED)]
+    corners = _point_indices(words, face_lines, sizes, point_lines)
+    place = np.flatnonzero(np.isin(kinds, [word[:3] for word in _CURVED]))
+    curved = [lines[k].split(None, 1)[0].decode() for k in place if lines[k].startswith(_CURVED)]
     remarks = (f"left out {len(curved)} free-form surface(s) ({curved[0]})",) if curved else ()
     carried, file = Carried(), Lines(lines, kinds, point_lines, face_lines)
     take_colours(file, carried)
-    take_corner_data(file, words if numbers is None else numbers, sizes, carried)
+    take_corner_data(file, words, sizes, carried)
     take_divisions(file, carried)
     take_lines(file, carried)
     return PolygonSoup(points=points, corners=corners, sizes=sizes, remarks=remarks, carried=carried)
+
+
+def _kinds(lines: list[bytes]) -> npt.NDArray[np.bytes_]:
+    """Return the first three letters (n,) of lines without white space in front of them, and with spaces for tabs."""
+    kinds = np.array([line[:3] for line in lines], dtype="S3")
+    letters = kinds.view(np.uint8).reshape(-1, 3)
+    for k in np.flatnonzero(((letters[:, 0] <= ord(" ")) & (letters[:, 0] > 0)) | (letters == ord("\t")).any(axis=1)):
+        kinds[k] = lines[k].lstrip()[:3].replace(b"\t", b" ")
+    return kinds
+
+
+def _corners(lines: list[bytes], face_lines: Integers) -> tuple[list[list[bytes]] | Integers, Integers]:
+    """Return the numbers of point, texture and normal of all corners (n, 3), or the words of faces, and their sizes."""
+    found = corner_numbers(lines, face_lines)
+    if found is not None:
+        return found
+    words = [lines[k].partition(b"#")[0].split()[1:] for k in face_lines]
+    return words, np.array([len(row) for row in words], dtype=np.int64)
 
 
 def _point_indices(

@@ -8,6 +8,7 @@ from anisomesh.io.carried import COLOUR, NORMAL, UV, Array, Carried, Integers, g
 from anisomesh.io.cells import SurfaceCells, strip_triangles
 from anisomesh.io.formats.ply.body import BinaryBody, PropertyValues, TextBody
 from anisomesh.io.formats.ply.header import REGIONS, TEXTURE_FILE, Element, read_header
+from anisomesh.io.formats.words import whole
 from anisomesh.io.polygons import PolygonSoup
 
 _INDEX_PROPERTIES = ("vertex_indices", "vertex_index")  # both are in use for the corners of a face
@@ -154,8 +155,9 @@ def _take_comments(comments: list[str], carried: Carried) -> None:
             continue
         values = carried.cell_data.get(words[1])
         if words[1] not in carried.divisions and values is not None:
-            del carried.cell_data[words[1]]
-            carried.add_cell_data(words[1], values, names={})
+            with carried.optional(f"regions {words[1]!r}"):
+                carried.add_cell_data(words[1], whole(values), names={})  # large labels are real numbers in the file
+                del carried.cell_data[words[1]]
         with carried.optional("a name of regions"):
             if words[1] in carried.divisions and len(words) == 4:
                 carried.divisions[words[1]].names[int(words[2])] = words[3]

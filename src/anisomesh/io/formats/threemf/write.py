@@ -40,9 +40,11 @@ def threemf_bytes(mesh: Mesh, losses: Losses) -> bytes:
     losses.features(mesh)
     objects = _objects(mesh, None if found is None else found[1], properties)
     items = "".join(f'<item objectid="{_FIRST_OBJECT + k}"/>' for k in range(len(objects)))
-    unit = mesh.materials.get("unit")
-    unit = unit if unit in _UNITS else "millimeter"
+    unit = mesh.materials.get("unit", "millimeter")
     losses.add("materials", *(name for name in mesh.materials if name not in ("unit", "display_colours")))
+    if unit not in _UNITS:
+        losses.say(f"the unit {unit!r}, for which the file has millimeter")
+        unit = "millimeter"
     model = (
         f'{_HEAD}<model unit="{unit}" xmlns="{CORE}" xmlns:m="{MATERIALS}">\n<resources>{resources}{"".join(objects)}'
         f"</resources><build>{items}</build></model>\n"

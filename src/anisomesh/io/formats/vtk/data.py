@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import re
+from collections.abc import Container, Mapping
 from xml.etree.ElementTree import Element
 
 import numpy as np
@@ -16,6 +17,9 @@ NAMES_OF_REGIONS = "regions of "
 They are text in UTF-8 as bytes, since not every library reads strings: lines of a label and, after a space, its name.
 """
 
+ORIGINAL_POINT = "original point"
+"""Name of our array of global numbers, which points that are repeated have in common."""
+
 _ARRAY_TAGS = ("DataArray", "Array")  # the second of strings
 _MEANINGS = (  # attribute of the section, names of arrays in use, our name
     ("TCoords", ("Texture Coordinates", "TextureCoordinates", "TCoords"), UV),
@@ -23,7 +27,7 @@ _MEANINGS = (  # attribute of the section, names of arrays in use, our name
 )
 
 
-class PieceData:
+class DataOfPieces:
     """The data of one section, such as point data, of all pieces.
 
     Parameters
@@ -36,17 +40,10 @@ class PieceData:
         self._section = section
         self._pieces: list[dict[str, Array]] = []
 
-    def add(self, piece: Element, arrays: ArrayReader, count: int, carried: Carried) -> None:
+    def add(self, data: dict[str, Array], count: int) -> None:
         """Add the data of a piece with a number of points or cells, unless it has none."""
-        if count == 0:
-            return
-        found: dict[str, Array] = {}
-        for element in piece.iterfind(f"{self._section}/*"):
-            name = element.get("Name", "")
-            if element.tag in _ARRAY_TAGS and name:
-                with carried.optional(f"{self._section} {name!r}"):
-                    found[name] = _rows(element, arrays, count)
-        self._pieces.append(found)
+        if count:
+            self._pieces.append(data)
 
     def all(self, carried: Carried) -> dict[str, Array]:
         """Return the arrays that every piece has; the others are left out with a remark."""
@@ -64,6 +61,17 @@ class PieceData:
         return together
 
 
+def read_section(piece: Element, section: str, arrays: ArrayReader, count: int, carried: Carried) -> dict[str, Array]:
+    """Return the point or cell data of a piece with a number of points or cells."""
+    found: dict[str, Array] = {}
+    for element in piece.iterfind(f"{section}/*"):
+        name = element.get("Name", "")
+        if count and element.tag in _ARRAY_TAGS and name:
+            with carried.optional(f"{section} {name!r}"):
+                found[name] = _rows(element, arrays, count)
+    return found
+
+
 def _rows(element: Element, arrays: ArrayReader, count: int) -> Array:
     """Return an array (count,) or (count, k)."""
     values = arrays.read(element)
@@ -73,22 +81,28 @@ def _rows(element: Element, arrays: ArrayReader, count: int) -> Array:
     return values.reshape(count, int(width)) if int(width) > 1 else values
 
 
-def read_field_data(root: Element, kind: str, arrays: ArrayReader, carried: Carried) -> dict[str, dict[int, str]]:
-    """Return the names of regions by division; other field data are materials."""
-    names: dict[str, dict[int, str]] = {}
-    others: dict[str, Array] = {}
+def read_field_data(root: Element, kind: str, arrays: ArrayReader, carried: Carried) -> dict[str, Array]:
+    """Return the field data of a file."""
+    found: dict[str, Array] = {}
     for element in root.iterfind(f"{kind}/FieldData/*"):
         name = element.get("Name", "")
-        if element.tag not in _ARRAY_TAGS or not name:
-            continue
+        if element.tag in _ARRAY_TAGS and name:
+            with carried.optional(f"FieldData {name!r}"):
+                values, width = arrays.read(element), element.get("NumberOfComponents", "1")
+                found[name] = values.reshape((-1, int(width)) if width.isdigit() and int(width) > 1 else (-1,))
+    return found
+
+
+def names_of_regions(fields: dict[str, Array], carried: Carried) -> dict[str, dict[int, str]]:
+    """Return the names of regions by division, from field data; other field data are materials."""
+    names: dict[str, dict[int, str]] = {}
+    others: dict[str, Array] = {}
+    for name, values in fields.items():
         with carried.optional(f"FieldData {name!r}"):
-            values = arrays.read(element)
             if name.startswith(NAMES_OF_REGIONS) and values.dtype == np.uint8:
                 names[name.removeprefix(NAMES_OF_REGIONS)] = _labels(values.tobytes().decode("utf-8", errors="replace"))
             else:
-                width = element.get("NumberOfComponents", "1")
-                shape = (-1, int(width)) if width.isdigit() and int(width) > 1 else (-1,)
-                others[name] = values.reshape(shape)
+                others[name] = values
     if others:
         carried.materials["field_data"] = others
     return names
@@ -105,15 +119,17 @@ def _labels(text: str) -> dict[int, str]:
     return found
 
 
-def names_by_meaning(piece: Element) -> dict[str, str]:
-    """Return our names of the point data of a piece that VTK knows as normals or texture coordinates."""
+def active_arrays(piece: Element) -> dict[str, str]:
+    """Return the names of the point data of a piece by the attribute that they are, such as ``"TCoords"``."""
     section = piece.find("PointData")
-    if section is None:
-        return {}
-    present = {element.get("Name", "") for element in section}
+    return {} if section is None else dict(section.attrib)
+
+
+def names_by_meaning(active: Mapping[str, str], present: Container[str]) -> dict[str, str]:
+    """Return our names of point data that VTK knows as normals or texture coordinates."""
     found = {}
     for attribute, usual, ours in _MEANINGS:
-        name = next((name for name in (section.get(attribute, ""), *usual) if name and name in present), None)
+        name = next((name for name in (active.get(attribute, ""), *usual) if name and name in present), None)
         if name is not None and ours not in present:
             found[name] = ours
     return found

@@ -12,125 +12,82 @@ from xml.etree import ElementTree
 import numpy as np
 import numpy.typing as npt
 
-from anisomesh.io.carried import Carried
-from anisomesh.io.cells import SurfaceCells
+from anisomesh.io.carried import Array
 from anisomesh.io.formats.vtk.arrays import ArrayReader
-from anisomesh.io.formats.vtk.data import PieceData, names_by_meaning, read_field_data
-from anisomesh.io.polygons import Integers, PolygonSoup
-from anisomesh.io.vtk_cells import LINE, POLYGON, STRIP, VERTEX, add_vtk_cells, add_vtk_lines
+from anisomesh.io.formats.vtk.data import active_arrays, read_field_data, read_section
+from anisomesh.io.formats.vtk.pieces import Piece, Pieces
+from anisomesh.io.polygons import PolygonSoup
+from anisomesh.io.vtk_cells import LINE, POLYGON, STRIP, VERTEX
 
 _ORDERS = {"LittleEndian": "<", "BigEndian": ">"}
 _HEADERS = {"UInt32": "u4", "UInt64": "u8"}
 
 
 def read_vtu(data: bytes) -> PolygonSoup:
-    """Read the surface cells of all pieces of a VTK unstructured grid, and their data.
-
-    Notes
-    -----
-    Lines are features, vertices are fixed points.
-    """
+    """Read the surface cells, lines and vertices of all pieces of a VTK unstructured grid, and their data."""
     file = _File(data, "UnstructuredGrid")
     for piece in file.pieces():
-        first = file.points.add(piece, file.arrays)
         types, connectivity, offsets = (
             _array(piece, "Cells", name, file.arrays) for name in ("types", "connectivity", "offsets")
         )
         declared = piece.get("NumberOfCells", "")
         if declared != str(len(types)):
             raise ValueError(f"truncated or malformed: a piece declares {declared!r} cells but has {len(types)}")
-        connectivity = _shifted(connectivity, file.points, first)
-        add_vtk_cells(file.cells, types, connectivity, offsets)
-        add_vtk_lines(file.carried, types, connectivity, offsets)
-        file.add_data(piece, file.points.count - first, len(types))
+        file.add(piece, types, connectivity, offsets)
     return file.soup()
 
 
 def read_vtp(data: bytes) -> PolygonSoup:
-    """Read the polygons and strips of all pieces of VTK polygon data, as :func:`read_vtu` does."""
+    """Read all pieces of VTK polygon data, as :func:`read_vtu` does."""
     file = _File(data, "PolyData")
     for piece in file.pieces():
-        first, n_cells = file.points.add(piece, file.arrays), 0
+        types, connectivity, ends = ([np.zeros(0, dtype=np.int64)] for _ in range(3))
         for section, cell_type in (("Verts", VERTEX), ("Lines", LINE), ("Polys", POLYGON), ("Strips", STRIP)):
             declared = piece.get(f"NumberOf{section}", "0")
             if declared == "0":
                 continue
-            connectivity, offsets = (_array(piece, section, name, file.arrays) for name in ("connectivity", "offsets"))
+            corners, offsets = (_array(piece, section, name, file.arrays) for name in ("connectivity", "offsets"))
             if declared != str(len(offsets)):
                 raise ValueError(f"truncated or malformed: {section} declares {declared!r} cells, has {len(offsets)}")
-            types, connectivity = np.full(len(offsets), cell_type), _shifted(connectivity, file.points, first)
-            add_vtk_cells(file.cells, types, connectivity, offsets)
-            add_vtk_lines(file.carried, types, connectivity, offsets)
-            n_cells += len(offsets)
-        file.add_data(piece, file.points.count - first, n_cells)
+            types.append(np.full(len(offsets), cell_type))
+            ends.append(offsets.astype(np.int64) + sum(map(len, connectivity)))
+            connectivity.append(corners.astype(np.int64))
+        file.add(piece, *map(np.concatenate, (types, connectivity, ends)))
     return file.soup()
 
 
 class _File:
-    """A file with the points, cells and data of its pieces."""
+    """A file and what was read of its pieces."""
 
     def __init__(self, data: bytes, kind: str) -> None:
         self._root, self.arrays = _parse(data, kind)
         self._kind = kind
-        self.points, self.cells, self.carried = _Points(), SurfaceCells(), Carried()
-        self._point_data, self._cell_data = PieceData("PointData"), PieceData("CellData")
-        self._ours: dict[str, str] = {}
+        self._pieces = Pieces()
 
     def pieces(self) -> list[ElementTree.Element]:
         """Return the pieces."""
         return self._root.findall(f"{self._kind}/Piece")
 
-    def add_data(self, piece: ElementTree.Element, n_points: int, n_cells: int) -> None:
-        """Add the data of a piece with these numbers of points and cells."""
-        self._point_data.add(piece, self.arrays, n_points, self.carried)
-        self._cell_data.add(piece, self.arrays, n_cells, self.carried)
-        self._ours |= names_by_meaning(piece)
+    def add(self, piece: ElementTree.Element, types: Array, connectivity: Array, offsets: Array) -> None:
+        """Add a piece with these cells."""
+        points, carried = _points(piece, self.arrays), self._pieces.carried
+        point_data = read_section(piece, "PointData", self.arrays, len(points), carried)
+        cell_data = read_section(piece, "CellData", self.arrays, len(types), carried)
+        active = active_arrays(piece)
+        self._pieces.add(Piece(points, types, connectivity, offsets, point_data, cell_data, active))
 
     def soup(self) -> PolygonSoup:
         """Return everything."""
-        carried = self.carried
-        names = read_field_data(self._root, self._kind, self.arrays, carried)
-        for name, values in self._point_data.all(carried).items():
-            carried.point_data[self._ours.get(name, name)] = values
-        for name, values in self._cell_data.all(carried).items():
-            carried.add_cell_data(name, values, names=names.get(name))
-        return self.cells.soup(self.points.all(), carried=carried)
+        return self._pieces.soup(read_field_data(self._root, self._kind, self.arrays, self._pieces.carried))
 
 
-class _Points:
-    """Points of pieces, one after the other."""
-
-    def __init__(self) -> None:
-        self._parts: list[npt.NDArray[np.float64]] = [np.zeros((0, 3))]
-        self.count = 0
-
-    def add(self, piece: ElementTree.Element, arrays: ArrayReader) -> int:
-        """Add the points of a piece; return the number of points before them."""
-        first = self.count
-        declared = piece.get("NumberOfPoints", "")
-        element = piece.find("Points/DataArray")
-        flat = np.zeros(0) if element is None else arrays.read(element)
-        if not declared.isdigit() or len(flat) != 3 * int(declared):
-            raise ValueError(f"truncated or malformed: a piece declares {declared!r} points but has {len(flat)} / 3")
-        self._parts.append(flat.astype(np.float64).reshape(-1, 3))
-        self.count += int(declared)
-        return first
-
-    def all(self) -> npt.NDArray[np.float64]:
-        """Return all points."""
-        return np.concatenate(self._parts)
-
-
-def _shifted(connectivity: npt.NDArray[Any], points: _Points, first: int) -> Integers:
-    """Return indices of points of the last piece as indices of all points."""
-    shifted: Integers = connectivity.astype(np.int64) + first
-    outside = np.flatnonzero((shifted < first) | (shifted >= points.count))
-    if len(outside):
-        raise ValueError(
-            f"a cell refers to point {shifted[outside[0]] - first} (counted from 0) but there are "
-            f"{points.count - first} points"
-        )
-    return shifted
+def _points(piece: ElementTree.Element, arrays: ArrayReader) -> Array:
+    """Return the points (V, 3) of a piece."""
+    declared, element = piece.get("NumberOfPoints", ""), piece.find("Points/DataArray")
+    flat = np.zeros(0) if element is None else arrays.read(element)
+    if not declared.isdigit() or len(flat) != 3 * int(declared):
+        raise ValueError(f"truncated or malformed: a piece declares {declared!r} points but has {len(flat)} / 3")
+    return flat.reshape(-1, 3)
 
 
 def _parse(data: bytes, kind: str) -> tuple[ElementTree.Element, ArrayReader]:

@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from typing import Any
+from dataclasses import replace
+from typing import Any, NamedTuple
 from xml.sax.saxutils import quoteattr
 
 import numpy as np
@@ -13,8 +14,16 @@ from anisomesh._arrays import Points
 from anisomesh.attributes.model import Mesh
 from anisomesh.io.carried import NORMAL, UV, Array
 from anisomesh.io.formats.vtk.arrays import packed_array, string_codes, type_name
-from anisomesh.io.formats.vtk.data import NAMES_OF_REGIONS
-from anisomesh.io.holding import Losses, continuous_corner_data, flat_rows, name_of, numeric, regions_as_integers
+from anisomesh.io.formats.vtk.data import NAMES_OF_REGIONS, ORIGINAL_POINT
+from anisomesh.io.holding import (
+    Losses,
+    continuous_corner_data,
+    flat_rows,
+    name_of,
+    numeric,
+    regions_as_integers,
+    with_points_repeated,
+)
 from anisomesh.io.polygons import Integers
 from anisomesh.io.vtk_cells import LINE, POLYGON, QUAD, TRIANGLE, VERTEX
 
@@ -43,21 +52,40 @@ def vtu_mesh_bytes(mesh: Mesh, losses: Losses) -> bytes:
 
 
 def vtp_mesh_bytes(mesh: Mesh, losses: Losses) -> bytes:
-    """Return a mesh as polygon data: as :func:`vtu_mesh_bytes`, with vertices and lines in front."""
-    points, faces = mesh.surface.points, mesh.surface.faces
+    """Return a mesh as polygon data: as :func:`vtu_mesh_bytes`, with vertices and lines in front.
+
+    Notes
+    -----
+    Points are repeated where corner data differ, so that VTK shows textures. Copies have the same global number.
+    """
+    mesh, polygons = vtk_polygons(mesh, losses)
     sections: dict[str, Data] = {}
-    for name, cells in (("Verts", mesh.fixed_points[:, None]), ("Lines", mesh.features), ("Polys", faces)):
+    for name, cells in polygons.cells.items():
         if len(cells):
             ends = np.arange(1, len(cells) + 1) * cells.shape[1]
-            sections[name] = {"connectivity": cells.ravel().astype(np.int64), "offsets": ends}
+            sections[name] = {"connectivity": cells.ravel(), "offsets": ends}
+    counts = " ".join(f'NumberOf{name}="{len(cells)}"' for name, cells in polygons.cells.items())
+    return _file("PolyData", mesh.surface.points, f'{counts} NumberOfStrips="0"', sections, polygons.data)
+
+
+class Polygons(NamedTuple):
+    """Cells (n, k) by section in the order of their data, and point, cell and field data."""
+
+    cells: dict[str, Integers]
+    data: tuple[dict[str, Array], dict[str, Array], dict[str, Array]]
+
+
+def vtk_polygons(mesh: Mesh, losses: Losses) -> tuple[Mesh, Polygons]:
+    """Return a mesh with points repeated where corner data differ, and its cells and data for polygon data of VTK."""
+    mesh, source = with_points_repeated(mesh)
+    if len(np.unique(source)) < len(source):
+        mesh = replace(mesh, point_data={**mesh.point_data, ORIGINAL_POINT: source})
+    found = {"Verts": mesh.fixed_points[:, None], "Lines": mesh.features, "Polys": mesh.surface.faces}
     n_before = len(mesh.fixed_points) + len(mesh.features)
     point_data, cell_data, fields = _data(mesh, losses)
     cell_data = {name: _padded(values, n_before, 0) for name, values in cell_data.items()}
-    counts = (
-        f'NumberOfVerts="{len(mesh.fixed_points)}" NumberOfLines="{len(mesh.features)}" NumberOfStrips="0" '
-        f'NumberOfPolys="{len(faces)}"'
-    )
-    return _file("PolyData", points, counts, sections, (point_data, cell_data, fields))
+    cells = {name: rows.astype(np.int64) for name, rows in found.items()}
+    return mesh, Polygons(cells, (point_data, cell_data, fields))
 
 
 def _data(mesh: Mesh, losses: Losses) -> tuple[dict[str, Array], dict[str, Array], dict[str, Array]]:
@@ -156,12 +184,18 @@ def _section(name: str, arrays: Data) -> str:
         tag, kind, numbers = "DataArray", "", values
         if values.dtype.kind == "U":
             tag, kind, numbers = "Array", "String", string_codes(values)
+        count += ' IdType="1"' if key == ORIGINAL_POINT and name == "PointData" else ""
         head = f'<{tag} type="{kind or type_name(values)}" Name={quoteattr(key)} format="binary"{count}>'
         lines.append(f"{head}\n{packed_array(numbers)}\n</{tag}>")
-    meanings = [(UV, "TCoords", (2, 3)), (NORMAL, "Normals", (3,))] if name == "PointData" else []
-    found = [(ours, attribute) for ours, attribute, widths in meanings if _width(arrays.get(ours)) in widths]
-    known = "".join(f' {attribute}="{ours}"' for ours, attribute in found)
+    known = "".join(f' {key}="{ours}"' for key, ours in active_names(arrays).items()) if name == "PointData" else ""
     return "\n".join([f"<{name}{known}>", *lines, f"</{name}>"])
+
+
+def active_names(point_data: Data) -> dict[str, str]:
+    """Return our names of the point data that VTK knows as texture coordinates, normals and global numbers."""
+    meanings = [("TCoords", UV, (2, 3)), ("Normals", NORMAL, (3,))]
+    found = {key: ours for key, ours, widths in meanings if _width(point_data.get(ours)) in widths}
+    return found | ({"GlobalIds": ORIGINAL_POINT} if ORIGINAL_POINT in point_data else {})
 
 
 def _width(values: Array | None) -> int:

@@ -1,0 +1,1 @@
+"""Mesh objects of PyVista, meshio and trimesh."""

@@ -1,0 +1,164 @@
+"""Mesh objects of other libraries as polygon soups, told apart by their attributes, so that no library is imported."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Callable, Iterator, Mapping
+from typing import Any, cast
+
+import numpy as np
+
+from anisomesh.io.carried import Array, Carried, Division, Integers
+from anisomesh.io.cells import Shape, SurfaceCells
+from anisomesh.io.formats.vtk.data import NAMES_OF_REGIONS
+from anisomesh.io.formats.vtk.pieces import Piece, Pieces
+from anisomesh.io.objects.trimesh_scenes import scene_soup
+from anisomesh.io.polygons import PolygonSoup
+
+BLOCK = "block"
+"""Name of the division into the blocks of a ``MultiBlock``."""
+
+CELL_SET = "cell_set"
+"""Name of the division into the cell sets of meshio; further ones, for sets that overlap, have a number."""
+
+MESHIO_DIVISIONS = {"gmsh:physical": "physical", "gmsh:geometrical": "geometrical", "medit:ref": "reference"}
+"""Our names of divisions of meshio, as the readers of these formats call them."""
+
+_MESHIO_SURFACE = re.compile(r"(?:VTK_LAGRANGE_)?(TRIANGLE|QUAD|POLYGON)(?:RILATERAL)?\d*", re.IGNORECASE)
+_MESHIO_OTHER = re.compile(
+    r"vertex|line\d*|tetra\d*|hexahedron\d*|wedge\d*|pyramid\d*|penta_prism|hexa_prism|polyhedron\d*"
+    r"|VTK_LAGRANGE_(?:CURVE|TETRAHEDRON|HEXAHEDRON|WEDGE|PYRAMID)"
+)
+_SURFACE_DIMENSION = 2  # of physical groups
+
+
+def polygon_soup(mesh: Any) -> PolygonSoup | None:
+    """Return a mesh object as polygons with everything that it carries; None if it is of another type.
+
+    Parameters
+    ----------
+    mesh
+        A ``trimesh.Trimesh``; a ``trimesh.Scene``, with its transformations applied; a ``meshio.Mesh``; a
+        ``pyvista.MultiBlock``, or any data set of PyVista that can become an unstructured grid.
+
+    Raises
+    ------
+    ValueError
+        If there are only cells that are not part of a surface, or some of unknown type.
+    """
+    readers: list[tuple[tuple[str, ...], Callable[[Any], PolygonSoup]]] = [
+        (("n_blocks",), _from_vtk),
+        (("cast_to_unstructured_grid",), _from_vtk),
+        (("geometry", "graph", "dump"), scene_soup),
+        (("points", "cells", "cell_data"), _from_meshio),
+        (("vertices", "faces"), scene_soup),
+    ]
+    for attributes, read in readers:
+        if all(hasattr(mesh, name) for name in attributes):
+            return read(mesh)
+    return None
+
+
+def _from_vtk(mesh: Any) -> PolygonSoup:
+    """Return a data set of PyVista, or all data sets in blocks of blocks."""
+    pieces, remarks, fields, blocks = Pieces(), list[str](), dict[str, Array](), list(_blocks(mesh))
+    numbered = hasattr(mesh, "n_blocks")
+    if numbered and any(BLOCK in getattr(block, "cell_data", {}) for _, block in blocks):
+        numbered = False
+        pieces.carried.remarks.append(f"left out the names of its blocks, whose cells have data {BLOCK!r}")
+    for number, (_, block) in enumerate(blocks):
+        if not hasattr(block, "cast_to_unstructured_grid"):
+            remarks.append(f"left out a block of type {type(block).__name__}, which has no cells")
+            continue
+        grid, point_data = block.cast_to_unstructured_grid(), block.point_data
+        active = {
+            "TCoords": point_data.active_texture_coordinates_name or "",
+            "Normals": point_data.active_normals_name or "",
+            "GlobalIds": getattr(point_data.GetGlobalIds(), "GetName", str)(),
+        }
+        cell_data = _arrays(grid.cell_data) | ({BLOCK: np.full(grid.n_cells, number)} if numbered else {})
+        offsets = grid.cell_offsets if hasattr(grid, "cell_offsets") else grid.offset  # older versions
+        cells = np.asarray(grid.celltypes), np.asarray(grid.cell_connectivity), np.asarray(offsets)[1:]
+        pieces.add(Piece(np.asarray(grid.points), *cells, _arrays(grid.point_data), cell_data, active))
+        for key, values in _arrays(block.field_data).items():
+            if not np.array_equal(fields.setdefault(key, values), values):
+                pieces.carried.remarks.append(f"left out field data {key!r} of further blocks")
+    if numbered:
+        text = "\n".join(f"{k} {' '.join(name.split())}" for k, (name, _) in enumerate(blocks))
+        fields[NAMES_OF_REGIONS + BLOCK] = np.frombuffer(text.encode(), np.uint8)
+    return pieces.soup({**fields, **_arrays(mesh.field_data)}, tuple(remarks))
+
+
+def _blocks(mesh: Any, name: str = "") -> Iterator[tuple[str, Any]]:
+    """Yield the data sets in blocks of blocks with their names, such as ``wing/upper``."""
+    if mesh is None or not hasattr(mesh, "n_blocks"):
+        yield from () if mesh is None else [(name, mesh)]
+        return
+    for k, block in enumerate(mesh):
+        own = str(mesh.get_block_name(k) or k) if hasattr(mesh, "get_block_name") else str(k)
+        yield from _blocks(block, f"{name}/{own}" if name else own)
+
+
+def _arrays(data: Mapping[str, Any]) -> dict[str, Array]:
+    """Return data of PyVista or meshio as arrays by name."""
+    return {str(name): np.asarray(values) for name, values in data.items()}
+
+
+def _from_meshio(mesh: Any) -> PolygonSoup:
+    cells, carried = SurfaceCells(), Carried()
+    for block in mesh.cells:
+        surface = _MESHIO_SURFACE.fullmatch(block.type)
+        if surface is not None and surface[1].lower() == "polygon":
+            sizes = np.array([len(row) for row in block.data], dtype=np.int64)
+            corners = [np.asarray(row, dtype=np.int64) for row in block.data]
+            cells.add_polygons(np.concatenate([np.zeros(0, dtype=np.int64), *corners]), sizes)
+        elif surface is not None:
+            cells.add(cast(Shape, surface[1].lower()), np.asarray(block.data))
+        elif _MESHIO_OTHER.fullmatch(block.type):
+            cells.ignore(block.type, len(block.data))
+            cells.take_numbers(len(block.data))
+        else:
+            raise ValueError(f"it has cells of type {block.type!r}, which is not known; convert them to triangles")
+        if block.type in ("line", "line3"):
+            carried.lines.append(np.asarray(block.data, dtype=np.int64))
+        elif block.type == "vertex":
+            carried.fixed_points.append(np.asarray(block.data, dtype=np.int64).ravel())
+    _carry_meshio(mesh, carried)
+    points = np.asarray(mesh.points, dtype=np.float64)
+    return cells.soup(np.pad(points, ((0, 0), (0, 3 - points.shape[1]))), carried=carried)
+
+
+def _carry_meshio(mesh: Any, carried: Carried) -> None:
+    """Add point and cell data, physical groups with their names, and sets of points and cells."""
+    carried.point_data |= _arrays(mesh.point_data)
+    groups = {name: np.ravel(value).tolist() for name, value in mesh.field_data.items()}
+    names = {value[0]: name for name, value in groups.items() if value[1:] == [_SURFACE_DIMENSION]}
+    for name, blocks in mesh.cell_data.items():
+        with carried.optional(f"cell data {name!r}"):
+            labelled = names if name == "gmsh:physical" else None
+            carried.add_cell_data(MESHIO_DIVISIONS.get(name, name), np.concatenate(blocks), names=labelled)
+    for name, chosen in mesh.point_sets.items():
+        with carried.optional(f"the set of points {name!r}"):
+            is_in = np.zeros(len(mesh.points), dtype=bool)
+            is_in[np.asarray(chosen, dtype=np.int64)] = True
+            if carried.point_data.setdefault(name, is_in) is not is_in:
+                raise ValueError("point data have its name")
+    first = np.cumsum([0, *(len(block.data) for block in mesh.cells)])
+    for name, blocks in mesh.cell_sets.items():
+        with carried.optional(f"the set of cells {name!r}"):
+            rows = [np.asarray(rows, dtype=np.int64) + start for rows, start in zip(blocks, first, strict=False)]
+            _add_set(carried, name, np.concatenate(rows), int(first[-1]))
+
+
+def _add_set(carried: Carried, name: str, chosen: Integers, n_cells: int) -> None:
+    """Add a set of cells to the first division whose sets it does not overlap; cells of no set have the label 0."""
+    number = 1
+    while True:
+        key = CELL_SET if number == 1 else f"{CELL_SET} {number}"
+        division = carried.divisions.setdefault(key, Division(labels=np.zeros(n_cells, dtype=np.int64)))
+        if not division.labels[chosen].any():
+            label = len(division.names) + 1
+            division.labels[chosen] = label
+            division.names[label] = name
+            return
+        number += 1

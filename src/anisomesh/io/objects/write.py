@@ -1,0 +1,202 @@
+"""Meshes with everything that they carry as objects of other libraries, which must be installed."""
+
+from __future__ import annotations
+
+import io
+import logging
+from collections.abc import Mapping
+from importlib import import_module
+from typing import Any
+
+import numpy as np
+
+from anisomesh.attributes.model import Mesh, Regions
+from anisomesh.io.carried import COLOUR, UV, Array, Integers
+from anisomesh.io.formats.gltf.read import MATERIAL, NODE
+from anisomesh.io.formats.gltf.write import glb_bytes
+from anisomesh.io.formats.vtk.data import ORIGINAL_POINT
+from anisomesh.io.formats.vtk.write import active_names, vtk_polygons
+from anisomesh.io.holding import Losses, by_label, continuous_corner_data, name_of, with_points_repeated
+from anisomesh.io.objects.read import CELL_SET, MESHIO_DIVISIONS
+from anisomesh.io.objects.trimesh_scenes import TRIMESH
+from anisomesh.mesh.surface import Surface
+
+logger = logging.getLogger(__name__)
+
+
+def to_pyvista(mesh: Mesh) -> Any:
+    """Return a mesh as a ``pyvista.PolyData``.
+
+    Parameters
+    ----------
+    mesh
+        The mesh, such as the ``mesh`` of a result.
+
+    Returns
+    -------
+    pyvista.PolyData
+        Triangles with point and cell data. Regions are cell data, with their names in field data; features are lines
+        and fixed points vertices, whose cells come first. Points are repeated where corner data differ.
+
+    Notes
+    -----
+    It is what :func:`~anisomesh.io.meshes.save` writes to VTP files.
+    """
+    pyvista, numpy_support = import_module("pyvista"), import_module("vtkmodules.util.numpy_support")
+    losses = Losses()
+    mesh, (cells, (point_data, cell_data, fields)) = vtk_polygons(mesh, losses)
+    data = pyvista.PolyData.from_regular_faces(mesh.surface.points, mesh.surface.faces)
+    for name, section in (("verts", "Verts"), ("lines", "Lines")):
+        rows = cells[section]
+        if len(rows):
+            setattr(data, name, np.insert(rows, 0, rows.shape[1], axis=1).ravel())
+    active = active_names(point_data)
+    numbers = point_data.pop(ORIGINAL_POINT, None)
+    for into, given in ((data.point_data, point_data), (data.cell_data, cell_data), (data.field_data, fields)):
+        for key, values in given.items():
+            into[key] = values
+    data.point_data.active_texture_coordinates_name = active.get("TCoords")
+    data.point_data.active_normals_name = active.get("Normals")
+    if numbers is not None:
+        array = numpy_support.numpy_to_vtkIdTypeArray(numbers.astype(np.int64), deep=True)
+        array.SetName(ORIGINAL_POINT)
+        data.GetPointData().SetGlobalIds(array)
+    _warn("PyVista", losses)
+    return data
+
+
+def to_meshio(mesh: Mesh) -> Any:
+    """Return a mesh as a ``meshio.Mesh``.
+
+    Parameters
+    ----------
+    mesh
+        The mesh, such as the ``mesh`` of a result.
+
+    Returns
+    -------
+    meshio.Mesh
+        Triangles, features as lines, and fixed points as vertices. Regions are cell data, called
+        ``gmsh:physical`` if they are physical groups; names of the latter are field data.
+    """
+    meshio = import_module("meshio")
+    losses = Losses()
+    features, fixed = mesh.features, mesh.fixed_points
+    cells = [("triangle", mesh.surface.faces), ("line", features), ("vertex", fixed[:, None])]
+    counts = [len(rows) for _, rows in cells if len(rows)]
+    theirs = {ours: name for name, ours in MESHIO_DIVISIONS.items()}
+    labels = {theirs.get(name, name): regions.labels for name, regions in mesh.regions.items()}
+    sets = {name: regions for name, regions in mesh.regions.items() if name.startswith(CELL_SET)}
+    losses.names_of_regions(mesh, *(name for name in mesh.regions if name not in ("physical", *sets)))
+    losses.add("face data", *(name for name in mesh.face_data if name in labels))
+    losses.add("materials", *mesh.materials)
+    physical = mesh.regions.get("physical")
+    chosen = {regions.names[k]: np.flatnonzero(regions.labels == k) for regions in sets.values() for k in regions.names}
+    result = meshio.Mesh(
+        mesh.surface.points,
+        [(name, np.asarray(rows, dtype=np.int64)) for name, rows in cells if len(rows)],
+        point_data={**mesh.point_data, **continuous_corner_data(mesh, losses)},
+        cell_data={
+            name: [values, *(_blank(values, count) for count in counts[1:])]
+            for name, values in {**mesh.face_data, **labels}.items()
+            if name not in sets
+        },
+        field_data={} if physical is None else {text: np.array([k, 2]) for k, text in physical.names.items()},
+        cell_sets={name: [rows, *(np.zeros(0, dtype=np.int64) for _ in counts[1:])] for name, rows in chosen.items()},
+    )
+    _warn("meshio", losses)
+    return result
+
+
+def to_trimesh(mesh: Mesh) -> Any:
+    """Return a mesh as an object of trimesh.
+
+    Parameters
+    ----------
+    mesh
+        The mesh, such as the ``mesh`` of a result.
+
+    Returns
+    -------
+    trimesh.Trimesh or trimesh.Scene
+        A scene if there are several nodes or materials, with a mesh for each combination. Point and face data are
+        vertex and face attributes, texture coordinates and colours are what trimesh draws. Points are repeated where
+        corner data differ, and regions that are neither nodes nor materials are face attributes.
+    """
+    trimesh: Any = import_module("trimesh")
+    losses = Losses()
+    losses.features(mesh)
+    mesh = with_points_repeated(mesh)[0]
+    nodes, materials, table = mesh.regions.get(NODE), mesh.regions.get(MATERIAL), _trimesh_materials(mesh)
+    others = [name for name in mesh.regions if name not in (NODE, MATERIAL)]
+    losses.names_of_regions(mesh, *others)
+    held = ["unit", *(name for name in (TRIMESH, "gltf") if isinstance(mesh.materials.get(name), Mapping))]
+    losses.add("materials", *(name for name in mesh.materials if name not in held))
+    none = np.zeros(mesh.surface.n_faces, dtype=np.int64)
+    scene = trimesh.Scene()
+    for (node, material), faces in by_label(*(none if d is None else d.labels for d in (nodes, materials))):
+        part = _trimesh_part(mesh, np.sort(faces), table.get(material))
+        part.face_attributes.update({name: mesh.regions[name].labels[np.sort(faces)] for name in others})
+        name = "" if nodes is None else name_of(nodes, node)
+        scene.add_geometry(part, node_name=name or None, geom_name=name or None)
+    _warn("trimesh", losses)
+    is_scene = len(scene.geometry) > 1 or nodes is not None
+    found = scene if is_scene else next(iter(scene.geometry.values()))
+    if isinstance(mesh.materials.get("unit"), str):
+        found.units = mesh.materials["unit"]
+    return found
+
+
+def _trimesh_materials(mesh: Mesh) -> dict[int, Any]:
+    """Return the materials of trimesh by their labels."""
+    trimesh: Any = import_module("trimesh")
+    theirs, given = mesh.materials.get(TRIMESH), mesh.materials.get("gltf")
+    if isinstance(theirs, Mapping):
+        return dict(theirs)
+    count = len(given.get("materials", [])) if isinstance(given, Mapping) else 0
+    if count == 0:
+        return {}
+    each = Regions(np.arange(count), {k: str(k) for k in range(count)})
+    one_face_each = Mesh(
+        surface=Surface(np.tile(np.eye(3), (count, 1)), np.arange(3 * count).reshape(-1, 3)),
+        point_data={UV: np.zeros((3 * count, 2))},
+        regions={NODE: each, MATERIAL: each},
+        materials={"gltf": given},
+    )
+    scene = trimesh.load(io.BytesIO(glb_bytes(one_face_each, Losses())), file_type="glb")
+    return {k: scene.geometry[scene.graph[str(k)][1]].visual.material for k in range(count)}
+
+
+def _trimesh_part(mesh: Mesh, chosen: Integers, material: Any) -> Any:
+    """Return some faces of a mesh without corner data as a ``trimesh.Trimesh``."""
+    trimesh: Any = import_module("trimesh")
+    used, corners = np.unique(mesh.surface.faces[chosen], return_inverse=True)
+    of_points = {name: values[used] for name, values in mesh.point_data.items()}
+    of_faces = {name: values[chosen] for name, values in mesh.face_data.items()}
+    visual, count = None, len(chosen)
+    uv = of_points.get(UV)
+    if material is not None or uv is not None:
+        visual = trimesh.visual.TextureVisuals(uv=of_points.pop(UV, None), material=material)
+    elif COLOUR in of_points:
+        visual = trimesh.visual.ColorVisuals(vertex_colors=of_points.pop(COLOUR))
+    elif COLOUR in of_faces:
+        visual = trimesh.visual.ColorVisuals(face_colors=of_faces.pop(COLOUR))
+    return trimesh.Trimesh(
+        mesh.surface.points[used],
+        corners.reshape(count, 3),
+        vertex_attributes=of_points,
+        face_attributes=of_faces,
+        visual=visual,
+        process=False,
+    )
+
+
+def _blank(values: Array, count: int) -> Array:
+    """Return rows for cells that have no value: NaN, 0 or empty."""
+    fill: Any = {"f": np.nan, "U": ""}.get(values.dtype.kind, 0)
+    return np.full((count, *values.shape[1:]), fill, dtype=values.dtype)
+
+
+def _warn(library: str, losses: Losses) -> None:
+    if losses.text():
+        logger.warning("left out what %s cannot hold: %s", library, losses.text())
