@@ -35,7 +35,7 @@ from anisomesh.metric.conformity import Conformity, MetricExtent, conformity
 from anisomesh.options import MIN_VERTICES, RemeshOptions, read_target, with_overrides
 from anisomesh.resolve import cvt_options, embedding_name
 from anisomesh.result import RemeshResult
-from anisomesh.setup.inputs import PreparedInput, prepared_input
+from anisomesh.setup.inputs import PreparedInput, prepared_input, with_split_sides
 from anisomesh.setup.measured import count_for_length, unit_of_lengths
 from anisomesh.setup.tasks import Tasks, set_up
 from anisomesh.voronoi.restricted import RestrictedVoronoi
@@ -126,15 +126,16 @@ def remesh(
     else:
         n = n_vertices or max(MIN_VERTICES, round((ratio or 0.0) * prepared.n_points))
         result = _remesh(source, n, options, run)
-    return _with_attributes(result, given, run) if options.attributes else result
+    return _with_attributes(result, given, options, run) if options.attributes else result
 
 
-def _with_attributes(result: RemeshResult, given: Mesh, run: Run) -> RemeshResult:
+def _with_attributes(result: RemeshResult, given: Mesh, options: RemeshOptions, run: Run) -> RemeshResult:
     """Return a result with everything that a mesh carries."""
     if given.is_bare:
         return result
     with run.stage("attributes"):
-        source = oriented_as(given, result.prepared) if result.prepare_report.faces_flipped else given
+        source = with_split_sides(given, result.prepare_report, options)
+        source = oriented_as(source, result.prepared) if result.prepare_report.faces_flipped else source
         mesh = transfer_attributes(source, result.surface)
     warnings = (*result.warnings, *losses_of_attributes(given, mesh))
     return replace(result, mesh=mesh, seconds=run.total_seconds(), warnings=warnings)

@@ -20,8 +20,9 @@ from anisomesh.mesh.surface import Surface
 from anisomesh.metric.sizes import checked_sizes
 from anisomesh.metric.tensors import validate_metric
 from anisomesh.options import RemeshOptions
+from anisomesh.repair.carried_data import without_t_junctions
 from anisomesh.repair.near_points import weld_distance
-from anisomesh.repair.prepare import Prepared, prepare
+from anisomesh.repair.prepare import Prepared, PrepareReport, prepare
 from anisomesh.resolve import follows_creases, is_designed
 
 _MAX_BORDER_SHARE = 0.4  # of the vertices asked for, that borders and seams may take; heuristic
@@ -108,7 +109,7 @@ def prepared_input(mesh: Mesh, options: RemeshOptions) -> PreparedInput:
         given = _at_prepared("size_field", options.size_field, (surface.n_points,), prepared, OptionError)
         sizes = checked_sizes(given, prepared.surface.points, prepared.point_source)
     prescribed = [mesh.features, *([] if options.features is None else [options.features])]
-    borders, seams = _borders(mesh, prepared.surface, options)
+    borders, seams = _borders(with_split_sides(mesh, prepared.report, options), prepared.surface, options)
     return PreparedInput(
         prepared=prepared,
         tensors=tensors,
@@ -119,6 +120,13 @@ def prepared_input(mesh: Mesh, options: RemeshOptions) -> PreparedInput:
         seams=seams,
         fixed=tagged_points(surface, mesh.fixed_points, prepared.surface, options.weld_tolerance),
     )
+
+
+def with_split_sides(mesh: Mesh, report: PrepareReport, options: RemeshOptions) -> Mesh:
+    """Return a mesh with sides of faces split as the repair has split them, so that borders and seams are edges."""
+    if mesh.is_bare or not (report.sides_split or report.faces_degenerate):
+        return mesh
+    return without_t_junctions(mesh, weld_distance(mesh.surface, options.weld_tolerance))
 
 
 def _tagged(
