@@ -21,6 +21,7 @@ class Losses:
     def __init__(self) -> None:
         self._names: dict[str, list[str]] = {}
         self._others: list[str] = []
+        self._changed: list[str] = []
 
     def add(self, what: str, *names: str) -> None:
         """Add data of a kind, such as point data, with these names."""
@@ -30,6 +31,10 @@ class Losses:
     def say(self, what: str) -> None:
         """Add something else."""
         self._others.append(what)
+
+    def changed(self, name: str) -> None:
+        """Add a name that is written with other characters."""
+        self._changed.append(name)
 
     def features(self, mesh: Mesh) -> None:
         """Add the features and fixed points of a mesh."""
@@ -45,6 +50,8 @@ class Losses:
     def text(self) -> str:
         """Return everything in one line, empty if nothing is left out."""
         parts = [f"{what} {', '.join(map(repr, names))}" for what, names in self._names.items()]
+        if self._changed:
+            parts.append(f"some characters of {len(self._changed)} name(s) such as {self._changed[0]!r}")
         return "; ".join([*parts, *self._others])
 
 
@@ -107,11 +114,6 @@ def continuous_corner_data(mesh: Mesh, losses: Losses) -> dict[str, Array]:
         else:
             losses.add("corner data", name)
     return kept
-
-
-def name_of(regions: Regions, label: int, otherwise: str = "") -> str:
-    """Return the name of a label in one line, or something else if it has none."""
-    return " ".join(regions.names.get(label, otherwise).split())
 
 
 def regions_as_integers(mesh: Mesh, divisions: Sequence[str]) -> dict[str, Integers]:

@@ -6,6 +6,7 @@ import numpy as np
 
 from anisomesh.io.carried import COLOUR, NORMAL, UV, Carried, Integers
 from anisomesh.io.formats.obj.lines import Lines
+from anisomesh.io.region_names import divide
 
 SMOOTHING = "smoothing_group"
 """Name of the smoothing groups (``s``) as face data."""
@@ -87,7 +88,8 @@ def take_divisions(file: Lines, carried: Carried) -> None:
             labels = np.array([0, *(number[text] for text in texts)], dtype=np.int64)
             of_faces = labels[np.searchsorted(given, file.face_lines)]
             if of_faces.any():
-                carried.add_cell_data(name, of_faces, names={k: text for text, k in number.items()})
+                before = [0] if (of_faces == 0).any() else []  # the label in front of the first one
+                divide(carried, name, of_faces, [*[""] * len(before), *number], [*before, *number.values()])
     with carried.optional("its smoothing groups"):
         given = file.of(b"s")
         labels = np.array([0, *(0 if file.rest(k) in ("off", "") else int(file.rest(k)) for k in given)])

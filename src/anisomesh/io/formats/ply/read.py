@@ -2,13 +2,16 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 import numpy as np
 
 from anisomesh.io.carried import COLOUR, NORMAL, UV, Array, Carried, Integers, grouped_columns
 from anisomesh.io.cells import SurfaceCells, strip_triangles
 from anisomesh.io.formats.ply.body import BinaryBody, PropertyValues, TextBody
-from anisomesh.io.formats.ply.header import REGIONS, TEXTURE_FILE, Element, read_header
+from anisomesh.io.formats.ply.header import NAME, REGIONS, TEXTURE_FILE, Element, read_header
 from anisomesh.io.polygons import PolygonSoup
+from anisomesh.io.region_names import unquoted
 
 _INDEX_PROPERTIES = ("vertex_indices", "vertex_index")  # both are in use for the corners of a face
 _RESTART = -1  # ends a strip in a list of strips
@@ -158,4 +161,15 @@ def _take_comments(comments: list[str], carried: Carried) -> None:
             carried.add_cell_data(words[1], values, names={})
         with carried.optional("a name of regions"):
             if words[1] in carried.divisions and len(words) == 4:
-                carried.divisions[words[1]].names[int(words[2])] = words[3]
+                carried.divisions[words[1]].names[int(words[2])] = unquoted(words[3])
+    for line in comments:
+        words = line.split(maxsplit=3)
+        if len(words) == 4 and words[0] == NAME:
+            at_faces = (carried.cell_data, carried.corner_data, carried.divisions)
+            for data in (carried.point_data,) if words[1] == "vertex" else at_faces:
+                _rename(data, words[2], unquoted(words[3]))
+
+
+def _rename(data: dict[str, Any], name: str, other: str) -> None:
+    if name in data and other not in data:
+        data[other] = data.pop(name)

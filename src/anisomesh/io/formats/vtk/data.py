@@ -96,8 +96,8 @@ def read_field_data(root: Element, kind: str, arrays: ArrayReader, carried: Carr
 
 def _labels(text: str) -> dict[int, str]:
     found = {}
-    for line in text.splitlines():
-        match = re.fullmatch(r"(-?\d{1,18})(?: (.*))?", line)
+    for line in text.split("\n"):
+        match = re.fullmatch(r"(-?\d{1,18})(?: (.*))?", line, re.DOTALL)
         if match is None:
             raise ValueError(f"{line[:40]!r} is not a label and its name")
         if match[2]:
