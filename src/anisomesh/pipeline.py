@@ -13,7 +13,14 @@ import numpy.typing as npt
 
 from anisomesh.attributes.model import Mesh
 from anisomesh.attributes.transfer import oriented_as, transfer_attributes
-from anisomesh.caveats import caveats, losses_of_attributes, losses_of_repair, losses_of_shape, unfollowed_sizes
+from anisomesh.caveats import (
+    caveats,
+    lengths_beyond,
+    losses_of_attributes,
+    losses_of_repair,
+    losses_of_shape,
+    unfollowed_sizes,
+)
 from anisomesh.counts.search import smallest_within
 from anisomesh.cvt.lbfgs import Optimised
 from anisomesh.cvt.schedule import DualFeedback, optimise_sites
@@ -126,6 +133,7 @@ def remesh(
     else:
         n = n_vertices or max(MIN_VERTICES, round((ratio or 0.0) * prepared.n_points))
         result = _remesh(source, n, options, run)
+    result = replace(result, warnings=(*lengths_beyond(prepared, options, max_error), *result.warnings))
     return _with_attributes(result, given, options, run) if options.attributes else result
 
 
@@ -191,7 +199,11 @@ def _remesh(
             *measured.remarks,
             *field.remarks,
             *losses_of_shape(
-                measured.surface, Surface(mesh.points, mesh.faces), task.corner_places, made.feature_distance
+                measured.surface,
+                Surface(mesh.points, mesh.faces),
+                task.corner_places,
+                made.feature_distance,
+                measured.followed,
             ),
             *caveats(n, field.noise, mesh, validity, optimised, measured.options),
             *(() if agreement is None else unfollowed_sizes(agreement)),

@@ -63,7 +63,8 @@ def tagged_edges(
     gone[table[np.isin(wanted_keys, keys), 2]] = False
     lines = input_mesh.points[ends[gone]]
     limit = max(radius, ON_SIDE * input_mesh.diagonal)
-    return np.isin(keys, wanted_keys) | _along(prepared, lines[(lines[:, 0] != lines[:, 1]).any(axis=1)], limit)
+    parts = _along(prepared, lines[(lines[:, 0] != lines[:, 1]).any(axis=1)], limit)
+    return np.asarray(np.isin(keys, wanted_keys) | parts)
 
 
 def _along(surface: Surface, lines: npt.NDArray[np.float64], limit: float) -> EdgeMask:

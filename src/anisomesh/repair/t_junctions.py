@@ -28,7 +28,7 @@ class _Junctions(NamedTuple):
 
 
 class SplitFaces(NamedTuple):
-    """Faces with split sides (F', 3), the face that each is a part of (F',), and the number of sides that were split."""
+    """Faces with split sides (F', 3), the face that each is a part of (F',), and the number of split sides."""
 
     faces: Faces
     source: Integers

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 import numpy.typing as npt
@@ -27,6 +27,14 @@ from anisomesh.resolve import follows_creases, is_designed
 
 _MAX_BORDER_SHARE = 0.4  # of the vertices asked for, that borders and seams may take; heuristic
 _LARGEST_DENSITY = 1e30  # and inverse of the smallest, so that energies are far from overflow
+
+
+class Followed(NamedTuple):
+    """Edges (E,) to follow, what they are in words, and what has to be said about others, a sentence each."""
+
+    edges: EdgeMask
+    words: str
+    remarks: tuple[str, ...]
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -59,8 +67,8 @@ class PreparedInput:
     seams: EdgeMask
     fixed: PointMask
 
-    def features_at(self, n_vertices: int, surface: Surface) -> tuple[EdgeMask, tuple[str, ...]]:
-        """Return the edges (E,) to follow with a number of vertices, and what has to be said about the others.
+    def features_at(self, n_vertices: int, surface: Surface) -> Followed:
+        """Return the edges to follow with a number of vertices.
 
         ``surface`` is the prepared surface at bounding-box diagonal 1.
 
@@ -69,13 +77,17 @@ class PreparedInput:
         """
         spacing = even_edge_length(surface.area, n_vertices)
         followed, remarks = self.tagged.copy(), []
+        kinds = ["prescribed edges"] if followed.any() else []
         for what, edges in (("borders between regions", self.borders), ("seams of corner data", self.seams)):
             needed = float(surface.edge_lengths[edges | followed].sum()) / spacing
-            if edges.any() and needed > _MAX_BORDER_SHARE * n_vertices:
+            if not edges.any():
+                continue
+            if needed > _MAX_BORDER_SHARE * n_vertices:
                 remarks.append(f"edges do not follow all {what}, which would take about {needed:,.0f} vertices")
             else:
                 followed |= edges
-        return followed, tuple(remarks)
+                kinds.append(what)
+        return Followed(followed, " and ".join(kinds), tuple(remarks))
 
 
 def prepared_input(mesh: Mesh, options: RemeshOptions) -> PreparedInput:
@@ -163,4 +175,10 @@ def _at_prepared(
     name: str, values: Any, shape: tuple[int, ...], prepared: Prepared, error: type[Exception]
 ) -> npt.NDArray[np.float64]:
     """Return values at the points of the input as values at the prepared points."""
+    try:
+        count = len(values)
+    except TypeError:  # a number, which has the wrong shape
+        count = shape[0]
+    if count != shape[0]:
+        raise error(f"{name} has {count:,} values; expected {shape[0]:,}, one for each point of the mesh")
     return np.asarray(real_array(name, values, shape, error)[prepared.point_source])

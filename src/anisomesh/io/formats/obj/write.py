@@ -6,7 +6,7 @@ from itertools import pairwise
 
 import numpy as np
 
-from anisomesh.attributes.model import Mesh, Regions
+from anisomesh.attributes.model import Mesh
 from anisomesh.io.carried import COLOUR, NORMAL, UV, Array, Integers
 from anisomesh.io.formats.obj.attributes import DIVISIONS, SMOOTHING
 from anisomesh.io.formats.words import format_rows

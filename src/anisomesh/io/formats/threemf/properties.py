@@ -82,8 +82,8 @@ class Properties:
             divide(carried, OBJECT, np.repeat(usual, self._counts), self._names, usual.tolist())
         materials = np.concatenate([np.zeros(0, dtype=np.int64), *self._materials])
         if materials.any():
-            names, usual = [name for name, _ in self._known], list(self._known.values())
-            label_of = divide(carried, MATERIAL, materials, names, usual)
+            names, given = [name for name, _ in self._known], list(self._known.values())
+            label_of = divide(carried, MATERIAL, materials, names, given)
             colours_of = {label_of[label]: colour for (_, colour), label in self._known.items()}
             carried.materials["display_colours"] = colours_of
         colours = np.concatenate([np.zeros((0, 3, 4), dtype=np.int64), *self._colours])
