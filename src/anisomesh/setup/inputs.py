@@ -175,10 +175,7 @@ def _at_prepared(
     name: str, values: Any, shape: tuple[int, ...], prepared: Prepared, error: type[Exception]
 ) -> npt.NDArray[np.float64]:
     """Return values at the points of the input as values at the prepared points."""
-    try:
-        count = len(values)
-    except TypeError:  # a number, which has the wrong shape
-        count = shape[0]
-    if count != shape[0]:
-        raise error(f"{name} has {count:,} values; expected {shape[0]:,}, one for each point of the mesh")
-    return np.asarray(real_array(name, values, shape, error)[prepared.point_source])
+    given = real_array(name, values, shape if len(shape) > 1 else (None,), error)
+    if len(given) != shape[0]:
+        raise error(f"{name} has {len(given):,} values; expected {shape[0]:,}, one for each point of the mesh")
+    return np.asarray(given[prepared.point_source])

@@ -172,7 +172,7 @@ def _prescribed(
     sizes = limited_sizes(surface, sizes / frame.scale, low=low, high=high, gradation=options.gradation)
     if sizes.min() > _LARGEST_SIZE:
         raise OptionError(
-            f"size_field is at least {sizes.min() * frame.scale:g} everywhere; expected lengths that fit the mesh, whose "
-            f"bounding-box diagonal is {frame.scale:.4g}"
+            f"size_field is at least {sizes.min() * frame.scale:g} everywhere; expected lengths that fit the mesh, "
+            f"whose bounding-box diagonal is {frame.scale:.4g}"
         )
     return metric_of_sizes(sizes)
