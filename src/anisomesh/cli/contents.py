@@ -14,8 +14,11 @@ if TYPE_CHECKING:
     from anisomesh.attributes.model import Array, Mesh, Regions
 
 _MAX_NAMED = 6  # regions of a division in a line of text
-_KINDS = {"point_data": "point data", "face_data": "face data", "corner_data": "corner data"}
-_UNITS = {".3mf": "millimeter", ".glb": "meter"}  # of files that name none, by the specifications of the formats
+_DATA_TITLES = {"point_data": "point data", "face_data": "face data", "corner_data": "corner data"}
+_UNIT_OF_FORMAT = {
+    ".3mf": "millimeter",
+    ".glb": "meter",
+}  # of files that name none, by the specifications of the formats
 
 
 def contents(mesh: Mesh, suffix: str) -> dict[str, Any]:
@@ -26,9 +29,9 @@ def contents(mesh: Mesh, suffix: str) -> dict[str, Any]:
     ends = mesh.surface.points[mesh.features]
     unit = mesh.materials.get("unit")
     return {
-        "unit": unit if isinstance(unit, str) else _UNITS.get(suffix),
+        "unit": unit if isinstance(unit, str) else _UNIT_OF_FORMAT.get(suffix),
         "regions": {name: _regions(regions, mesh.surface.face_areas) for name, regions in mesh.regions.items()},
-        **{kind: _arrays(getattr(mesh, kind), 2 if kind == "corner_data" else 1) for kind in _KINDS},
+        **{kind: _arrays(getattr(mesh, kind), 2 if kind == "corner_data" else 1) for kind in _DATA_TITLES},
         "prescribed_edges": {
             "count": len(mesh.features),
             "length": float(np.linalg.norm(ends[:, 1] - ends[:, 0], axis=1).sum()),
@@ -63,7 +66,7 @@ def contents_rows(facts: dict[str, Any]) -> list[tuple[str, str]]:
         texts = [str(region["name"] or region["label"]) for region in regions]
         more = f" and {len(texts) - _MAX_NAMED:,} more" if len(texts) > _MAX_NAMED else ""
         rows.append(("regions", f"{name}: {len(texts):,} ({', '.join(texts[:_MAX_NAMED])}{more})"))
-    for kind, title in _KINDS.items():
+    for kind, title in _DATA_TITLES.items():
         if facts[kind]:
             rows.append((title, ", ".join(_array_text(name, facts[kind][name]) for name in facts[kind])))
     edges = facts["prescribed_edges"]

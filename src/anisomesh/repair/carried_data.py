@@ -14,7 +14,7 @@ from anisomesh.mesh.surface import Surface
 from anisomesh.repair.degenerate import is_degenerate
 from anisomesh.repair.t_junctions import split_at_t_junctions
 
-_MAX_ROUNDS = 20  # of splitting one side of each face; three are enough but for chains of narrow faces
+_MAX_SPLIT_ROUNDS = 20  # of splitting one side of each face; three are enough but for chains of narrow faces
 
 
 def without_t_junctions(mesh: Mesh, tolerance: float) -> Mesh:
@@ -38,7 +38,7 @@ def without_t_junctions(mesh: Mesh, tolerance: float) -> Mesh:
     mesh = with_seams_at_corners(mesh, joints)
     source = np.flatnonzero(~is_degenerate(surface.points, joints.place[surface.faces])).astype(np.int64)
     faces, labels = surface.faces[source], joints.place.astype(np.int32)
-    for _ in range(_MAX_ROUNDS):
+    for _ in range(_MAX_SPLIT_ROUNDS):
         split = split_at_t_junctions(surface.points, faces, labels, tolerance)
         if split.n_split == 0:
             break

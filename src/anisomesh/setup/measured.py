@@ -29,7 +29,9 @@ from anisomesh.setup.inputs import PreparedInput
 logger = logging.getLogger(__name__)
 
 _FIRST_COUNT = 5_000  # vertices for which the metric is first measured, where their number is not known; heuristic
-_LARGEST_SIZE = 1e5  # diagonals, that the smallest size may have: lengths of the embedding are its inverse; heuristic
+_MAX_SMALLEST_SIZE = (
+    1e5  # diagonals, that the smallest size may have: lengths of the embedding are its inverse; heuristic
+)
 _COUNT_ROUNDS, _COUNT_TOLERANCE = 4, 0.01  # of the measurement of the metric for the count found, and its change
 
 
@@ -170,7 +172,7 @@ def _prescribed(
         sizes = checked_sizes(sizes, places)
     low, high = (None if bound is None else bound / frame.scale for bound in (options.min_size, options.max_size))
     sizes = limited_sizes(surface, sizes / frame.scale, low=low, high=high, gradation=options.gradation)
-    if sizes.min() > _LARGEST_SIZE:
+    if sizes.min() > _MAX_SMALLEST_SIZE:
         raise OptionError(
             f"size_field is at least {sizes.min() * frame.scale:g} everywhere; expected lengths that fit the mesh, "
             f"whose bounding-box diagonal is {frame.scale:.4g}"

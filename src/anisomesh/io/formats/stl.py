@@ -10,10 +10,10 @@ import numpy as np
 from anisomesh._arrays import Points
 from anisomesh.attributes.model import Mesh, Regions
 from anisomesh.io.carried import Carried
+from anisomesh.io.formats.region_names import divide, in_words, region_texts
 from anisomesh.io.formats.words import BYTE_ORDER_MARK, format_rows
 from anisomesh.io.holding import Losses, by_label, main_division
 from anisomesh.io.polygons import PolygonSoup
-from anisomesh.io.region_names import divide, in_words, region_texts
 from anisomesh.mesh.geometry import face_cross, unit
 from anisomesh.mesh.weld import coincident
 

@@ -15,8 +15,8 @@ from anisomesh.io.cells import SurfaceCells, strip_triangles
 from anisomesh.io.formats.gltf.attributes import Attributes, read_attributes
 from anisomesh.io.formats.gltf.document import Document, index_of
 from anisomesh.io.formats.gltf.materials import read_materials
+from anisomesh.io.formats.region_names import divide, is_number
 from anisomesh.io.polygons import Integers, PolygonSoup
-from anisomesh.io.region_names import divide, is_number
 
 NODE, MATERIAL = "node", "material"
 """Names of the divisions into the nodes of the scene and into materials."""

@@ -13,8 +13,8 @@ from anisomesh.io.formats.gltf.attributes import Encoded, encoded
 from anisomesh.io.formats.gltf.document import BINARY_CHUNK, COMPONENTS, JSON_CHUNK, WIDTHS
 from anisomesh.io.formats.gltf.materials import write_materials
 from anisomesh.io.formats.gltf.read import MATERIAL, NO_MATERIAL, NODE, TRIANGLES
+from anisomesh.io.formats.region_names import region_texts
 from anisomesh.io.holding import Losses, by_label, main_division
-from anisomesh.io.region_names import region_texts
 
 _ALIGNMENT = 4  # bytes
 _ELEMENT_ARRAY, _ARRAY = 34963, 34962  # targets of views

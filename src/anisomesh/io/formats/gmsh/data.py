@@ -13,7 +13,7 @@ from anisomesh.io.formats.gmsh.elements import PHYSICAL, Entities
 from anisomesh.io.formats.gmsh.numbers import NumberStream
 from anisomesh.io.formats.words import whole
 
-REGIONS = "anisomesh regions"
+COMMENT = "anisomesh regions"
 """Beginning of the comment that names divisions and regions, in JSON."""
 
 _SURFACE = 2  # dimension
@@ -36,9 +36,9 @@ def read_comments(data: bytes, carried: Carried) -> dict[str, dict[int, str]]:
     """Return the names of regions by division that a comment of ours has."""
     for section in sections(data, b"Comments"):
         for line in section.splitlines():
-            if line.startswith(REGIONS.encode()):
+            if line.startswith(COMMENT.encode()):
                 with carried.optional("the names of regions"):
-                    given = json.loads(line[len(REGIONS) :])
+                    given = json.loads(line[len(COMMENT) :])
                     return {
                         str(name): {int(label): str(text) for label, text in names.items()}
                         for name, names in given.items()

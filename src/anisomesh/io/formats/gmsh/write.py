@@ -9,8 +9,9 @@ import numpy as np
 
 from anisomesh.attributes.model import Mesh, Regions
 from anisomesh.io.carried import Array, Integers, separate_columns
-from anisomesh.io.formats.gmsh.data import REGIONS
+from anisomesh.io.formats.gmsh.data import COMMENT
 from anisomesh.io.formats.gmsh.elements import LINE, PHYSICAL, POINT, TRIANGLE, entities_of
+from anisomesh.io.formats.region_names import in_a_line, region_texts
 from anisomesh.io.holding import (
     Losses,
     continuous_corner_data,
@@ -19,7 +20,6 @@ from anisomesh.io.holding import (
     main_division,
     numeric,
 )
-from anisomesh.io.region_names import in_a_line, region_texts
 
 _WIDTHS = (1, 3, 9)  # numbers of components that Gmsh knows
 
@@ -110,7 +110,7 @@ def _comments(mesh: Mesh, physical: Regions | None, names: Mapping[int, str]) ->
     if not kept:
         return b""
     text = json.dumps(kept).replace("$", "\\u0024")  # with which sections begin
-    return f"$Comments\n{REGIONS} {text}\n$EndComments\n".encode()
+    return f"$Comments\n{COMMENT} {text}\n$EndComments\n".encode()
 
 
 def _physical_names(physical: Regions | None, names: Mapping[int, str]) -> bytes:

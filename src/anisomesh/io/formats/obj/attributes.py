@@ -6,7 +6,7 @@ import numpy as np
 
 from anisomesh.io.carried import COLOUR, NORMAL, UV, Carried, Integers
 from anisomesh.io.formats.obj.lines import Lines
-from anisomesh.io.region_names import divide
+from anisomesh.io.formats.region_names import divide
 
 SMOOTHING = "smoothing_group"
 """Name of the smoothing groups (``s``) as face data."""

@@ -9,9 +9,9 @@ import numpy as np
 from anisomesh.attributes.model import Mesh
 from anisomesh.io.carried import COLOUR, NORMAL, UV, Array, Integers
 from anisomesh.io.formats.obj.attributes import DIVISIONS, SMOOTHING
+from anisomesh.io.formats.region_names import in_words, region_texts
 from anisomesh.io.formats.words import format_rows
 from anisomesh.io.holding import Losses, main_division
-from anisomesh.io.region_names import in_words, region_texts
 
 _FREE = ("object", "group")  # words that take a division that OBJ does not know
 

@@ -10,8 +10,8 @@ from anisomesh.io.carried import COLOUR, NORMAL, UV, Array, Carried, Integers, g
 from anisomesh.io.cells import SurfaceCells, strip_triangles
 from anisomesh.io.formats.ply.body import BinaryBody, PropertyValues, TextBody
 from anisomesh.io.formats.ply.header import NAME, REGIONS, TEXTURE_FILE, Element, read_header
+from anisomesh.io.formats.region_names import unquoted
 from anisomesh.io.polygons import PolygonSoup
-from anisomesh.io.region_names import unquoted
 
 _INDEX_PROPERTIES = ("vertex_indices", "vertex_index")  # both are in use for the corners of a face
 _RESTART = -1  # ends a strip in a list of strips

@@ -9,8 +9,8 @@ import numpy as np
 from anisomesh.attributes.model import Mesh
 from anisomesh.io.carried import COLOUR, NORMAL, UV, Array, separate_columns
 from anisomesh.io.formats.ply.header import NAME, PLY_TYPES, REGIONS, TEXTURE_FILE
+from anisomesh.io.formats.region_names import quoted
 from anisomesh.io.holding import Losses, flat_rows, is_exact_in_float64, numeric, regions_as_integers
-from anisomesh.io.region_names import quoted
 
 _COLUMNS = {  # names of the columns of arrays, by name and width
     (COLOUR, 3): ("red", "green", "blue"),

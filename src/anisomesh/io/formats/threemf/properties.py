@@ -7,7 +7,7 @@ from typing import Protocol
 import numpy as np
 
 from anisomesh.io.carried import COLOUR, Carried, Integers
-from anisomesh.io.region_names import divide
+from anisomesh.io.formats.region_names import divide
 
 OBJECT, MATERIAL = "object", "material"
 """Names of the divisions into objects and into base materials."""

@@ -13,11 +13,11 @@ import numpy as np
 
 from anisomesh.attributes.model import Mesh, Regions
 from anisomesh.io.carried import COLOUR, Array, Integers
+from anisomesh.io.formats.region_names import region_texts
 from anisomesh.io.formats.threemf.properties import MATERIAL, OBJECT
 from anisomesh.io.formats.threemf.read import CORE, MATERIALS, MODEL_TYPE, ROOT
 from anisomesh.io.formats.words import format_rows
 from anisomesh.io.holding import Losses, by_label, main_division
-from anisomesh.io.region_names import region_texts
 
 _DATE = (1980, 1, 1, 0, 0, 0)  # of all entries, so that the same mesh gives the same file
 _GREY = "#808080FF"

@@ -12,11 +12,11 @@ import numpy.typing as npt
 from anisomesh._arrays import Points
 from anisomesh.attributes.model import Mesh
 from anisomesh.io.carried import NORMAL, UV, Array
+from anisomesh.io.formats.region_names import in_a_line, region_texts
 from anisomesh.io.formats.vtk.arrays import packed_array, string_codes, type_name
 from anisomesh.io.formats.vtk.data import NAMES_OF_REGIONS
 from anisomesh.io.holding import Losses, continuous_corner_data, flat_rows, numeric, regions_as_integers
 from anisomesh.io.polygons import Integers
-from anisomesh.io.region_names import in_a_line, region_texts
 from anisomesh.io.vtk_cells import LINE, POLYGON, QUAD, TRIANGLE, VERTEX
 
 Data = Mapping[str, npt.NDArray[Any]]
