@@ -133,7 +133,8 @@ def remesh(
     else:
         n = n_vertices or max(MIN_VERTICES, round((ratio or 0.0) * prepared.n_points))
         result = _remesh(source, n, options, run)
-    result = replace(result, warnings=(*lengths_beyond(prepared, options, max_error), *result.warnings))
+    if n_vertices is None and ratio is None:
+        result = replace(result, warnings=(*lengths_beyond(prepared, options, max_error), *result.warnings))
     return _with_attributes(result, given, options, run) if options.attributes else result
 
 

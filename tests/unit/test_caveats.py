@@ -137,5 +137,6 @@ def test_a_length_larger_than_the_model_is_said(asked):
         asked = {"size_field": np.full(ball.n_points, 9.0), "metric": "uniform"}
     result = anisomesh.remesh(ball, embedding="direct", **asked)
     assert any("is larger than the whole mesh" in line for line in result.warnings)
-    fine = anisomesh.remesh(ball, embedding="direct", metric="uniform", edge_length=0.5)
-    assert not any("larger than" in line for line in fine.warnings)
+    for fine in ({"edge_length": 0.5}, {"size_field": np.full(ball.n_points, 9.0), "n_vertices": 50}):
+        result = anisomesh.remesh(ball, embedding="direct", metric="uniform", **fine)
+        assert not any("larger than" in line for line in result.warnings)

@@ -15,10 +15,7 @@ if TYPE_CHECKING:
 
 _MAX_NAMED = 6  # regions of a division in a line of text
 _DATA_TITLES = {"point_data": "point data", "face_data": "face data", "corner_data": "corner data"}
-_UNIT_OF_FORMAT = {
-    ".3mf": "millimeter",
-    ".glb": "meter",
-}  # of files that name none, by the specifications of the formats
+_UNIT_OF_FORMAT = {".3mf": "millimeter", ".glb": "meter"}  # where the file names none, by specification
 
 
 def contents(mesh: Mesh, suffix: str) -> dict[str, Any]:

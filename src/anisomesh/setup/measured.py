@@ -29,9 +29,7 @@ from anisomesh.setup.inputs import PreparedInput
 logger = logging.getLogger(__name__)
 
 _FIRST_COUNT = 5_000  # vertices for which the metric is first measured, where their number is not known; heuristic
-_MAX_SMALLEST_SIZE = (
-    1e5  # diagonals, that the smallest size may have: lengths of the embedding are its inverse; heuristic
-)
+_MAX_SMALLEST_SIZE = 1e5  # diagonals; above, lengths in the embedding are too small to compute with; heuristic
 _COUNT_ROUNDS, _COUNT_TOLERANCE = 4, 0.01  # of the measurement of the metric for the count found, and its change
 
 
