@@ -36,7 +36,7 @@ def losses_of_repair(report: PrepareReport) -> Iterator[str]:
 
 
 def losses_of_shape(
-    surface: Surface, mesh: Surface, corner_places: Points, feature_distance: float = 0.0
+    surface: Surface, mesh: Surface, corner_places: Points, feature_distance: float = 0.0, followed: str = "lines"
 ) -> Iterator[str]:
     """Yield one sentence for everything that a mesh has lost of the shape of a surface.
 
@@ -47,10 +47,12 @@ def losses_of_shape(
     corner_places
         Where a designed surface has corners of creases and apexes (n, 3).
     feature_distance
-        Largest distance from prescribed edges to edges of the mesh that follow them.
+        Largest distance from the lines that edges are to follow to the edges that do.
+    followed
+        What these lines are.
     """
     if feature_distance > _FEATURE_TOLERANCE * mesh.edge_lengths.mean():
-        yield "prescribed edges are not all edges of the result; ask for more vertices"
+        yield f"not all {followed} are edges of the result; ask for more vertices"
     if len(corner_places) and is_designed(surface):
         distance = cKDTree(mesh.points).query(corner_places)[0]
         lost = np.count_nonzero(distance > _AT_CORNER * surface.diagonal)
@@ -73,6 +75,22 @@ def unfollowed_sizes(agreement: Conformity) -> Iterator[str]:
         )
 
 
+def lengths_beyond(surface: Surface, options: RemeshOptions, max_error: float | None) -> Iterator[str]:
+    """Yield one sentence for a length asked for, in model units, that is larger than a surface."""
+    sizes = options.size_field
+    lengths = {"max_error": max_error}
+    if isinstance(options.metric, str) or callable(options.metric):  # else lengths are in a metric without a unit
+        lengths["edge_length"] = options.edge_length
+        if sizes is not None and not callable(sizes):
+            lengths["size_field"] = float(np.min(np.asarray(sizes)))
+    for name, length in lengths.items():
+        if length is not None and length > surface.diagonal:
+            yield (
+                f"{name} {length:g} is larger than the whole mesh, whose bounding-box diagonal is "
+                f"{surface.diagonal:.4g}; the result has as few vertices as possible"
+            )
+
+
 def losses_of_attributes(before: Mesh, after: Mesh) -> Iterator[str]:
     """Yield one sentence for everything that a mesh carries in another form than the mesh it was made from, or not."""
     moved = sorted(set(after.corner_data) - set(before.corner_data))
@@ -80,7 +98,11 @@ def losses_of_attributes(before: Mesh, after: Mesh) -> Iterator[str]:
         names = ", ".join(moved)
         yield f"point data with different values at coincident points are corner data of the result: {names}"
     yield from _shrunk_regions(before, after)
-    n = len(np.unique(before.surface.points[before.fixed_points], axis=0))
+    used = before.fixed_points[np.isin(before.fixed_points, before.surface.faces)]
+    unused = len(np.unique(before.fixed_points)) - len(np.unique(used))
+    if unused:
+        yield f"fixed points that no face uses are left out: {unused:,}"
+    n = len(np.unique(before.surface.points[used], axis=0))
     lost = n - len(after.fixed_points)
     if lost > 0:
         yield f"{lost:,} of {n:,} fixed points have no vertex of the result; ask for more vertices"

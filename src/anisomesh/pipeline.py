@@ -13,7 +13,14 @@ import numpy.typing as npt
 
 from anisomesh.attributes.model import Mesh
 from anisomesh.attributes.transfer import oriented_as, transfer_attributes
-from anisomesh.caveats import caveats, losses_of_attributes, losses_of_repair, losses_of_shape, unfollowed_sizes
+from anisomesh.caveats import (
+    caveats,
+    lengths_beyond,
+    losses_of_attributes,
+    losses_of_repair,
+    losses_of_shape,
+    unfollowed_sizes,
+)
 from anisomesh.counts.search import smallest_within
 from anisomesh.cvt.lbfgs import Optimised
 from anisomesh.cvt.schedule import DualFeedback, optimise_sites
@@ -36,7 +43,7 @@ from anisomesh.metric.unit_edges import UnitMetric
 from anisomesh.options import MIN_VERTICES, RemeshOptions, read_target, with_overrides
 from anisomesh.resolve import cvt_options, embedding_name
 from anisomesh.result import RemeshResult
-from anisomesh.setup.inputs import PreparedInput, prepared_input
+from anisomesh.setup.inputs import PreparedInput, prepared_input, with_split_sides
 from anisomesh.setup.measured import count_for_length, unit_of_lengths
 from anisomesh.setup.tasks import Tasks, set_up
 from anisomesh.voronoi.restricted import RestrictedVoronoi
@@ -127,15 +134,18 @@ def remesh(
     else:
         n = n_vertices or max(MIN_VERTICES, round((ratio or 0.0) * prepared.n_points))
         result = _remesh(source, n, options, run)
-    return _with_attributes(result, given, run) if options.attributes else result
+    if n_vertices is None and ratio is None:
+        result = replace(result, warnings=(*lengths_beyond(prepared, options, max_error), *result.warnings))
+    return _with_attributes(result, given, options, run) if options.attributes else result
 
 
-def _with_attributes(result: RemeshResult, given: Mesh, run: Run) -> RemeshResult:
+def _with_attributes(result: RemeshResult, given: Mesh, options: RemeshOptions, run: Run) -> RemeshResult:
     """Return a result with everything that a mesh carries."""
     if given.is_bare:
         return result
     with run.stage("attributes"):
-        source = oriented_as(given, result.prepared) if result.prepare_report.faces_flipped else given
+        source = with_split_sides(given, result.prepare_report, options)
+        source = oriented_as(source, result.prepared) if result.prepare_report.faces_flipped else source
         mesh = transfer_attributes(source, result.surface)
     warnings = (*result.warnings, *losses_of_attributes(given, mesh))
     return replace(result, mesh=mesh, seconds=run.total_seconds(), warnings=warnings)
@@ -191,7 +201,11 @@ def _remesh(
             *measured.remarks,
             *field.remarks,
             *losses_of_shape(
-                measured.surface, Surface(mesh.points, mesh.faces), task.corner_places, made.feature_distance
+                measured.surface,
+                Surface(mesh.points, mesh.faces),
+                task.corner_places,
+                made.feature_distance,
+                measured.followed,
             ),
             *caveats(n, field.noise, mesh, validity, optimised, measured.options),
             *(() if agreement is None else unfollowed_sizes(agreement)),

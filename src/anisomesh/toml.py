@@ -8,7 +8,7 @@ from collections.abc import Iterable
 from pathlib import Path
 from typing import Any
 
-from anisomesh.errors import OptionError
+from anisomesh.errors import OptionError, why_unreadable
 
 
 def parse_toml(name: str, text: str) -> dict[str, Any]:
@@ -42,8 +42,10 @@ def read_toml(path: Path) -> dict[str, Any]:
     """
     try:
         text = path.read_text(encoding="utf-8")
-    except (OSError, UnicodeDecodeError) as error:
-        raise OptionError(f"{path} cannot be read: {error}") from error
+    except OSError as error:
+        raise OptionError(f"{path}: {why_unreadable(path, error)}; expected a TOML file") from error
+    except UnicodeDecodeError as error:
+        raise OptionError(f"{path} cannot be read as text: {error}") from error
     return parse_toml(str(path), text)
 
 

@@ -49,6 +49,9 @@ def refuse(run_cli, tmp_path):
         (["-n", "100", "--report", "out.ply"], "same file name"),
         (["-n", "100", "--report", "missing/report.json"], "the folder missing does not exist"),
         (["-n", "100", "--shapness", "3"], "--shapness"),
+        (["-n", "100", "--weld", "-1"], "--weld -1: expected a positive finite length"),
+        (["--edge-length", "nan"], "--edge-length nan: expected a positive finite length"),
+        (["--max-error", "0%"], "--max-error 0%: expected a positive finite length"),
         (["-n", "100", "--threads", "99999999999999999999"], "--threads"),
         (["-n", "100", "--report", "/dev/null"], "not a plain file"),
     ],
@@ -122,8 +125,7 @@ def test_a_folder_that_cannot_be_written_is_found_out_before_the_work(refuse, to
 def test_a_file_of_features_that_is_missing_or_binary_is_named(refuse, torus_obj, tmp_path):
     words = ["remesh", torus_obj, "-o", "out.ply", "-n", 100, "--features"]
     line = refuse(1, *words, "missing.txt")
-    reason = "No such file or directory; expected a text file, two vertex numbers per line"
-    assert line == f"anisomesh: error: missing.txt: cannot be read: {reason}"
+    assert line == ("anisomesh: error: missing.txt: no such file; expected a text file, two vertex numbers per line")
     (tmp_path / "pairs.bin").write_bytes(b"\xff\xfe\x00")
     assert "pairs.bin: cannot be read as text" in refuse(1, *words, "pairs.bin")
 
@@ -188,3 +190,35 @@ def test_a_closed_pipe_gives_no_traceback(torus_obj):
     with subprocess.Popen([*CLI, "info", str(torus_obj)], stdout=subprocess.PIPE, stderr=subprocess.PIPE) as process:
         process.stdout.close()
         assert process.stderr.read() == b""
+
+
+@pytest.mark.parametrize(
+    "words",
+    [
+        ("info", "{}.ply"),
+        ("evaluate", "{}.ply", "{}.ply"),
+        ("remesh", "MESH", "-o", "out.ply", "-n", 100, "--features", "{}.txt"),
+        ("remesh", "MESH", "-o", "out.ply", "-n", 100, "--density", "{}.txt"),
+        ("remesh", "MESH", "-o", "out.ply", "-n", 100, "--weights", "{}.safetensors"),
+        ("train", "{}.toml"),
+        ("benchmark", "{}.toml"),
+        ("figure", "result", "{}.ply", "MESH", "-o", "out.png"),
+    ],
+)
+def test_a_missing_folder_of_an_input_is_named(refuse, torus_obj, words):
+    def told(name):
+        return refuse(1, *(torus_obj if word == "MESH" else str(word).format(name) for word in words))
+
+    assert "the folder no does not exist" in told("no/such/file")
+    assert "does not exist" not in told("./file")
+
+
+def test_files_of_another_number_of_vertices_are_refused_with_both_numbers(refuse, torus_obj, tmp_path):
+    n = sum(line.startswith("v ") for line in torus_obj.read_text().splitlines())
+    (tmp_path / "few.txt").write_text("1.0\n" * (n - 1))
+    (tmp_path / "pairs.txt").write_text(f"0 {n}\n")
+    command = ("remesh", torus_obj, "-o", "out.ply", "-n", 100)
+    line = refuse(1, *command, "--density", "few.txt")
+    assert f"few.txt: found {n - 1:,} numbers; expected {n:,}" in line
+    line = refuse(1, *command, "--features", "pairs.txt")
+    assert f"pairs.txt: found vertex {n}; expected 0 to {n - 1}" in line

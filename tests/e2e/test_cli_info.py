@@ -5,6 +5,8 @@ import json
 import numpy as np
 import pytest
 
+import anisomesh
+from anisomesh.shapes.analytic import box
 from conftest import torus_arrays, write_obj
 
 SQUARE = "v 0 0 0\nv 3 0 0\nv 3 4 0\nv 0 4 0\n"
@@ -73,3 +75,51 @@ def test_text_and_two_components(run_cli, tmp_path):
     assert process.returncode == 0
     assert "closed, 2 components, Euler 0, manifold" in process.stdout
     assert "nothing to repair" in process.stdout
+
+
+def test_what_the_file_carries_is_listed(run_cli, facts, tmp_path):
+    surface = box((1.0, 2.0, 3.0), n=2)
+    side = np.argmax(np.abs(surface.face_normals), axis=1)
+    line = surface.edges[(surface.points[surface.edges][..., 1:] == 0.0).all(axis=(1, 2))]
+    mesh = anisomesh.Mesh(
+        surface=surface,
+        point_data={"temperature": np.zeros(surface.n_points), "velocity": np.zeros((surface.n_points, 3))},
+        face_data={"count": np.zeros(surface.n_faces, dtype=np.int32)},
+        regions={"physical": anisomesh.Regions(side + 1, {2: "inlet"})},
+        features=line,
+        fixed_points=[0, 3],
+    )
+    anisomesh.save(mesh, tmp_path / "in.vtu")
+    found = facts(tmp_path / "in.vtu")
+    areas = {region["label"]: region["area"] for region in found["regions"]["physical"]}
+    assert areas == pytest.approx({1: 12.0, 2: 6.0, 3: 4.0})
+    assert [region["name"] for region in found["regions"]["physical"]] == [None, "inlet", None]
+    assert found["point_data"]["velocity"] == {"type": "float64", "components": 3}
+    assert found["prescribed_edges"] == {"count": len(line), "length": pytest.approx(1.0)}
+    assert (found["fixed_points"], found["unit"]) == (2, None)
+    text = run_cli("info", tmp_path / "in.vtu").stdout
+    for words in (
+        "physical: 3 (1, inlet, 3)",
+        "temperature (float64), velocity (float64 x 3)",
+        "count (int32)",
+        f"{len(line)} edges of length 1",
+        "2 points",
+    ):
+        assert words in text
+
+
+@pytest.mark.parametrize(("suffix", "unit"), [("3mf", "millimeter"), ("glb", "meter"), ("obj", None)])
+def test_the_unit_and_texture_coordinates_of_a_file(run_cli, facts, tmp_path, suffix, unit):
+    surface = box(n=2)
+    uv = np.random.default_rng(0).uniform(size=(surface.n_points, 2))
+    mesh = anisomesh.Mesh(surface=surface, point_data={} if suffix == "3mf" else {"uv": uv})
+    anisomesh.save(mesh, tmp_path / f"in.{suffix}")
+    assert facts(tmp_path / f"in.{suffix}")["unit"] == unit
+    text = run_cli("info", tmp_path / f"in.{suffix}").stdout
+    assert ("texture coordinates" in text) == (suffix != "3mf")
+    assert any(line.split() == ["unit", unit] for line in text.splitlines()) == (unit is not None)
+
+
+def test_an_inch_is_an_inch(facts, tmp_path):
+    anisomesh.save(anisomesh.Mesh(surface=box(n=1), materials={"unit": "inch"}), tmp_path / "in.3mf")
+    assert facts(tmp_path / "in.3mf")["unit"] == "inch"

@@ -164,7 +164,7 @@ def test_the_command_reads_the_edges_and_says_what_is_wrong_with_them(run_cli, t
     (tmp_path / "edges.txt").write_text("0 900000\n")
     done = run_cli(*words, "-n", 100, cwd=tmp_path)
     assert done.returncode == 1
-    assert done.stderr.strip().splitlines()[-1].startswith("anisomesh: error: features has points")
+    assert done.stderr.strip().splitlines()[-1].startswith("anisomesh: error: edges.txt: found vertex 900000")
 
 
 @pytest.mark.slow

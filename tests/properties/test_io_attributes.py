@@ -127,9 +127,9 @@ def test_random_meshes(suffix, mesh):
         for name, values in getattr(mesh, kind).items():
             if suffix == ".obj" and (name != "uv" or mesh.regions):
                 continue
-            found = getattr(read, kind)["_".join(name.split()) if suffix == ".ply" else name]
+            found = getattr(read, kind)[name]
             np.testing.assert_array_equal(found, values.reshape(len(values), *found.shape[1:]))
-    if "regions" in kinds and mesh.regions and (mesh.regions["physical"].labels.any() or suffix in (".vtu", ".ply")):
+    if "regions" in kinds and mesh.regions and (mesh.regions["physical"].labels.any() or suffix != ".mesh"):
         found, given_ = read.regions["reference" if suffix == ".mesh" else "physical"], mesh.regions["physical"]
         np.testing.assert_array_equal(found.labels, given_.labels)
         assert suffix == ".mesh" or found.names == given_.names
@@ -139,6 +139,87 @@ def test_random_meshes(suffix, mesh):
         }
     if "fixed_points" in kinds:
         assert read.fixed_points.tolist() == mesh.fixed_points.tolist()
+
+
+NAMES_ONLY = (".obj", ".stl", ".glb", ".3mf")
+
+
+@pytest.mark.parametrize("suffix", sorted(set(MESH_FORMATS) - {".off"}))
+@pytest.mark.parametrize("division", ["region", "material"])
+@pytest.mark.parametrize("labels", [(1, 5, 9), (0, 1), (0,), (-3, 0), (-1, 2), (7,), (-1,)])
+def test_regions_without_names_keep_their_numbers(suffix, division, labels):
+    mesh = Mesh(surface=formats.SURFACE, regions={division: Regions(np.resize(labels, formats.N_FACES))})
+    read, warnings = formats.round_trip(mesh, suffix)
+    if suffix == ".mesh" and labels == (0,):  # no faces have references
+        assert warnings == [f"stream: left out what MEDIT cannot hold: regions '{division}'"]
+    else:
+        assert warnings == []
+        assert formats.regions_kept(mesh, read) == formats.EXACT
+        assert not any(regions.names for regions in read.regions.values())
+
+
+@pytest.mark.parametrize("suffix", NAMES_ONLY)
+def test_names_and_numbers_in_one_division(suffix):
+    labels = np.resize([1, 4, 7], formats.N_FACES)
+    mesh = Mesh(surface=formats.SURFACE, regions={"part": Regions(labels, {4: "inlet", 7: "region_9"})})
+    read, warnings = formats.round_trip(mesh, suffix)
+    assert warnings == []
+    (regions,) = read.regions.values()
+    assert list(regions.names.values()) == ["inlet"]
+    assert {1, 9} < set(regions.labels.tolist())  # a name such as ours stands for a number
+    again, _ = formats.round_trip(read, suffix)
+    assert formats.regions_kept(read, again) in (formats.EXACT, formats.NAMES)
+
+
+ODD_NAMES = {1: ' two  blanks "and quotes"', 2: "it's\nin two lines", 3: '"', 4: "$EndComments", 5: "Wand 3 \u2028"}
+
+
+@pytest.mark.parametrize("suffix", sorted(set(MESH_FORMATS) - {".off", ".mesh"}))
+def test_odd_names_of_regions_are_kept_or_named(suffix):
+    labels = np.resize(list(ODD_NAMES), formats.N_FACES)
+    mesh = Mesh(surface=formats.SURFACE, regions={"my part": Regions(labels, ODD_NAMES)})
+    read, warnings = formats.round_trip(mesh, suffix)
+    (regions,) = read.regions.values()
+    _, faces, _ = formats.by_corner(mesh)
+    _, faces_read, _ = formats.by_corner(read)
+    found = [regions.names.get(label) for label in regions.labels[faces_read]]
+    expected = [ODD_NAMES[label] for label in labels[faces]]
+    if found == expected:
+        assert warnings == []
+    else:
+        assert len(warnings) == 1
+        assert "some characters of" in warnings[0]
+        assert suffix in (".obj", ".stl", ".vtu", ".vtp")
+    if suffix in (".ply", ".vtu", ".vtp"):
+        assert list(read.regions) == ["my part"]
+
+
+@pytest.mark.parametrize("suffix", [".ply", ".vtu", ".vtp", ".msh"])
+def test_regions_with_label_0_stay_regions_beside_others_and_edges(suffix):
+    labels = np.arange(formats.N_FACES) % 2
+    regions = {name: Regions(labels, {0: "none", 1: "all"}) for name in ("physical", "geometrical", "zone", "foo")}
+    mesh = Mesh(surface=formats.SURFACE, regions=regions, features=formats.SURFACE.edges[:5])
+    read, warnings = formats.round_trip(mesh, suffix)
+    assert warnings == []
+    assert set(read.regions) == set(regions)
+    assert not read.face_data
+    for each in read.regions.values():
+        np.testing.assert_array_equal(each.labels, labels)
+        assert each.names == {0: "none", 1: "all"}
+
+
+@pytest.mark.parametrize("suffix", [".ply", ".vtu", ".vtp", ".msh", ".glb"])
+def test_names_of_data_are_kept_or_named(suffix):
+    names = ['of "one" point', "wall  shear", " in front"]
+    values = np.arange(formats.N_POINTS, dtype=np.float32)
+    read, warnings = formats.round_trip(Mesh(surface=formats.SURFACE, point_data=dict.fromkeys(names, values)), suffix)
+    if suffix == ".msh":
+        assert warnings == [
+            "stream: left out what MSH cannot hold: some characters of 1 name(s) such as 'of \"one\" point'"
+        ]
+    else:
+        assert warnings == []
+        assert set(read.point_data) == set(names)
 
 
 @pytest.mark.parametrize(

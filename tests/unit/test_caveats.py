@@ -4,7 +4,9 @@ import numpy as np
 import pytest
 
 import anisomesh
-from anisomesh.caveats import losses_of_shape
+from anisomesh import Mesh, Regions
+from anisomesh.caveats import losses_of_attributes, losses_of_shape
+from anisomesh.setup.inputs import prepared_input
 from anisomesh.shapes import analytic as shapes
 
 CORNERS = np.array([(x, y, z) for x in (0.0, 1.0) for y in (0.0, 1.0) for z in (0.0, 1.0)])
@@ -66,3 +68,75 @@ def _comb(n):
     quads += [(0, m, 2 * m, 3 * m), (4 * m - 1, 3 * m - 1, 2 * m - 1, m - 1)]
     faces = [(q[0], q[k + 1], q[k]) for q in quads for k in (1, 2)]
     return points, np.array(faces)
+
+
+def test_lines_that_are_not_followed_are_called_what_they_are():
+    """Regression: seams of charts were called prescribed edges."""
+    plane = shapes.open_patch(lambda x, y: 0.0 * x, n=20)
+    corners = plane.points[plane.faces]
+    inside = (np.abs(corners.mean(axis=1)[:, :2]) < 0.3).all(axis=1)
+    uv = corners[..., :2] + np.where(inside, 5.0, 0.0)[:, None, None]
+    for carried, words in (
+        ({"corner_data": {"uv": uv}}, "seams of corner data"),
+        ({"regions": {"part": Regions(inside.astype(int))}}, "borders between regions"),
+    ):
+        mesh = Mesh(surface=plane, **carried)
+        lines = prepared_input(mesh, anisomesh.RemeshOptions()).features_at(40, plane)
+        assert lines.words == words
+        assert lines.edges.any()
+        said = list(losses_of_shape(plane, plane, NO_CORNERS, 1.0, lines.words))
+        assert said == [f"not all {words} are edges of the result; ask for more vertices"]
+
+
+@pytest.mark.parametrize("offset", [0.0, 300.0])
+@pytest.mark.parametrize("weld_tolerance", [0.0, "auto"])
+def test_rounding_of_point_data_makes_no_seam(offset, weld_tolerance):
+    """Regression: data that differ by rounding at nearly equal points counted as seams."""
+    surface = shapes.box(n=4)
+    soup = anisomesh.Surface(
+        surface.points[surface.faces].reshape(-1, 3), np.arange(3 * surface.n_faces).reshape(-1, 3)
+    )
+    noise = np.random.default_rng(0).uniform(-1.0, 1.0, soup.n_points)
+    points = soup.points + (0.0 if weld_tolerance == 0.0 else 1e-7) * noise[:, None]
+    values = offset + soup.points[:, 0] + 1e-6 * noise
+    mesh = Mesh(surface=anisomesh.Surface(points, soup.faces), point_data={"t": values})
+    result = anisomesh.remesh(mesh, n_vertices=60, weld_tolerance=weld_tolerance)
+    assert result.warnings == ()
+    np.testing.assert_allclose(result.mesh.point_data["t"], offset + result.surface.points[:, 0], atol=1e-5)
+
+
+def test_a_jump_of_point_data_is_a_seam():
+    surface = shapes.box(n=4)
+    soup = anisomesh.Surface(
+        surface.points[surface.faces].reshape(-1, 3), np.arange(3 * surface.n_faces).reshape(-1, 3)
+    )
+    values = np.where((soup.face_normals[:, 2] > 0.5).repeat(3), 1e-2, 0.0) + soup.points[:, 0]
+    result = anisomesh.remesh(Mesh(surface=soup, point_data={"t": values}), n_vertices=60)
+    top = result.surface.face_normals[:, 2] > 0.5
+    expected = result.surface.points[result.surface.faces][..., 0] + np.where(top, 1e-2, 0.0)[:, None]
+    np.testing.assert_allclose(result.mesh.corner_data["t"], expected, atol=1e-9)
+
+
+def test_a_fixed_point_that_no_face_uses_asks_for_no_vertices():
+    box = shapes.box(n=4)
+    surface = anisomesh.Surface(np.concatenate([box.points, [[9.0, 9.0, 9.0]]]), box.faces)
+    before = Mesh(surface=surface, fixed_points=[0, box.n_points])
+    after = Mesh(surface=box, fixed_points=[0])
+    assert list(losses_of_attributes(before, after)) == ["fixed points that no face uses are left out: 1"]
+    lost = list(losses_of_attributes(before, Mesh(surface=box)))
+    assert "1 of 1 fixed points have no vertex of the result; ask for more vertices" in lost
+
+
+@pytest.mark.parametrize(
+    "asked",
+    [{"edge_length": 1e9}, {"edge_length": 1e9, "metric": "uniform"}, {"max_error": 1e9}, {"size_field": 9.0}],
+)
+def test_a_length_larger_than_the_model_is_said(asked):
+    ball = shapes.sphere(2)
+    if "size_field" in asked:
+        asked = {"size_field": np.full(ball.n_points, 9.0), "metric": "uniform"}
+    result = anisomesh.remesh(ball, embedding="direct", **asked)
+    assert any("is larger than the whole mesh" in line for line in result.warnings)
+    for fine in ({"edge_length": 0.5}, {"size_field": np.full(ball.n_points, 9.0), "n_vertices": 50}):
+        result = anisomesh.remesh(ball, embedding="direct", metric="uniform", **fine)
+        assert not any("larger than" in line for line in result.warnings)

@@ -16,7 +16,8 @@ from anisomesh.mesh.weld import coincident
 
 BEYOND_BOUNDARY, BEYOND_SEAM = -1, -2  # in place of a face across a side
 
-_SAME_VALUE = 1e-6  # of the range of values, up to which real numbers agree; above the rounding of float32
+_SAME_VALUE = 1e-4  # of the range of values, up to which real numbers agree: above what welded points differ by
+_ROUNDING = 4.0 * float(np.finfo(np.float32).eps)  # of the values: of files in float32
 
 Mask = npt.NDArray[np.bool_]
 
@@ -59,12 +60,7 @@ class Joints:
     def continuous(self, values: Array) -> Mask:
         """Return at which pairs of sides (n,) values at corners (F, 3, ...) agree at both ends."""
         rows = values.reshape(3 * len(values), -1)
-        if rows.dtype.kind in "fc":
-            finite = rows[np.isfinite(rows)]
-            slack = _SAME_VALUE * float(np.abs(finite - finite[0]).max()) if finite.size else 0.0
-            apart = ~(np.abs(rows[self._corners[:, :, 0]] - rows[self._corners[:, :, 1]]) <= slack)
-        else:
-            apart = rows[self._corners[:, :, 0]] != rows[self._corners[:, :, 1]]
+        apart = _differ(rows[self._corners[:, :, 0]], rows[self._corners[:, :, 1]], rows)
         return np.asarray(~apart.any(axis=(1, 2)))
 
     def charts(self, continuous: Mask) -> Ints:
@@ -94,8 +90,23 @@ class Joints:
         return np.asarray(half_edges(self.surface.faces)[self.pairs[~continuous, 0]], dtype=np.int64)
 
 
+def _differ(values: Array, others: Array, field: Array) -> Mask:
+    """Return where values (n, ...) of a field differ, real numbers by more than a share of its range and rounding."""
+    if field.dtype.kind not in "fc":
+        return np.asarray(values != others)
+    finite = field[np.isfinite(field)]
+    slack = 0.0
+    if finite.size:
+        slack = _SAME_VALUE * float(np.abs(finite - finite[0]).max()) + _ROUNDING * float(np.abs(finite).max())
+    with np.errstate(invalid="ignore"):  # of infinite values
+        near = (values == others) | (np.abs(values - others) <= slack)
+    return np.asarray(~(near | (np.isnan(values) & np.isnan(others))))
+
+
 def with_seams_at_corners(mesh: Mesh, joints: Joints) -> Mesh:
     """Return a mesh whose point data with different values at coincident points are corner data.
+
+    Real numbers that differ by rounding, or as little as values at points that a tolerance welds, are equal.
 
     Files without corner data, such as GLB, repeat points along seams.
     """
@@ -105,10 +116,7 @@ def with_seams_at_corners(mesh: Mesh, joints: Joints) -> Mesh:
         return mesh
     point_data, corner_data = dict(mesh.point_data), dict(mesh.corner_data)
     for name, values in mesh.point_data.items():
-        differs = values[used] != values[place]
-        if values.dtype.kind in "fc":
-            differs &= ~(np.isnan(values[used]) & np.isnan(values[place]))
-        if differs.any():
+        if _differ(values[used], values[place], values).any():
             corner_data[name] = point_data.pop(name)[mesh.surface.faces]
     if len(point_data) == len(mesh.point_data):
         return mesh

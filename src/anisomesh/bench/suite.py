@@ -10,7 +10,7 @@ from typing import Any
 from anisomesh.bench.disturb import CLEAN, check_disturbance
 from anisomesh.bench.methods import METHODS
 from anisomesh.errors import OptionError
-from anisomesh.toml import check_keys, hint, parse_toml
+from anisomesh.toml import check_keys, hint, parse_toml, read_toml
 
 _SUITE_KEYS = {"description", "meshes", "shapes", "closed", "inputs", "ratios", "seeds", "samples", "methods"}
 _METHOD_KEYS = {"name", "method", "options", "training"}
@@ -102,8 +102,8 @@ def load_suite(name: str) -> Suite:
     """
     if name in suite_names():
         text = (resources.files("anisomesh.bench") / "suites" / f"{name}.toml").read_text(encoding="utf-8")
-    elif name.endswith(".toml") and Path(name).is_file():
-        text = Path(name).read_text(encoding="utf-8")
+    elif name.endswith(".toml") and (Path(name).is_file() or len(Path(name).parts) > 1):
+        return parse_suite(Path(name).stem, read_toml(Path(name)))
     else:
         meant = hint(name, suite_names())
         raise OptionError(

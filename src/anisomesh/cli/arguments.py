@@ -229,7 +229,8 @@ class Length:
             raise typer.BadParameter(
                 f"{option} {text}: expected a length such as 0.2, or 0.1% of the diagonal"
             ) from None
-        positive(value)
+        if not (math.isfinite(value) and value > 0):
+            raise typer.BadParameter(f"{option} {text}: expected a positive finite length")
         return cls(value, text.endswith("%"))
 
     def on(self, surface: Surface) -> float:

@@ -8,7 +8,8 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from anisomesh.cli.arguments import InputFormat
-from anisomesh.cli.job import check_input_format, read
+from anisomesh.cli.contents import contents, contents_rows
+from anisomesh.cli.job import check_input_format, read_mesh
 from anisomesh.cli.report import as_json, counted, describe_validity, hints, table
 
 if TYPE_CHECKING:
@@ -20,9 +21,11 @@ def command(
     input_format: InputFormat = None,
     json_: Annotated[bool, typer.Option("--json", help="Print the facts as JSON and nothing else.")] = False,
 ) -> None:
-    """Describe a mesh: size, topology, defects, and the repairs before a remesh; - is standard input."""
+    """Describe a mesh: size, topology, what it carries, defects, the repairs before a remesh; - is standard input."""
     check_input_format(source, input_format)
-    facts = describe(read(source, input_format)[0]) | {"file": str(source)}
+    mesh = read_mesh(source, input_format)[0]
+    suffix = "." + (input_format or source.suffix).lower().removeprefix(".")
+    facts = describe(mesh.surface) | contents(mesh, suffix) | {"file": str(source)}
     typer.echo(as_json(facts) if json_ else _text(facts))
 
 
@@ -94,6 +97,7 @@ def _text(facts: dict[str, Any]) -> str:
         ("edge length", f"{lengths['min']:.4g} to {lengths['max']:.4g}, mean {lengths['mean']:.4g}"),
         ("surface", describe_validity(facts["validity"])),
         ("genus", "not defined" if facts["genus"] is None else str(facts["genus"])),
+        *contents_rows(facts),
         *(("to prepare", change) for change in changes),
     ]
     if prepare["changes"]:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from functools import partial
 from pathlib import Path
-from typing import Annotated, Any
+from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
@@ -22,6 +22,9 @@ from anisomesh.cli.job import STANDARD_STREAM, Outputs, check_input_format, defa
 from anisomesh.cli.metric_file import MetricFile, check_beside_metric_file, path_of
 from anisomesh.cli.progress import progress
 from anisomesh.cli.report import as_json, hints, summary
+
+if TYPE_CHECKING:
+    from anisomesh.mesh.surface import Surface
 
 _output = partial(typer.Option, rich_help_panel="Output")
 _input = partial(typer.Option, rich_help_panel="Input")
@@ -140,6 +143,7 @@ def command(
     prescribed = None if metric_file is None else MetricFile.read(metric_file)
     with progress(quiet) as display:
         mesh, seconds = read_mesh(source, input_format)
+        _check_tables(mesh.surface, options, features, density)
         options |= {"n_vertices": n_vertices, "ratio": ratio}
         options["max_error"] = None if error is None else error.on(mesh.surface)
         options["edge_length"] = None if length is None else length.on(mesh.surface)
@@ -161,3 +165,20 @@ def command(
         typer.echo(as_json(facts))
     elif not quiet:
         typer.echo(summary(facts, outputs.paths, result.prepare_report.lines()), err=to_stdout)
+
+
+def _check_tables(surface: Surface, options: dict[str, Any], features: Path | None, density: Path | None) -> None:
+    """Raise MeshFileError if files of edges or weights do not fit the points of a mesh."""
+    from anisomesh.errors import MeshFileError
+
+    n_points = surface.n_points
+    if density is not None and len(options["density"]) != n_points:
+        found = len(options["density"])
+        raise MeshFileError(
+            f"{density}: found {found:,} numbers; expected {n_points:,}, one for each vertex of the mesh"
+        )
+    if features is not None and options["features"].size and options["features"].max() >= n_points:
+        largest = options["features"].max()
+        raise MeshFileError(
+            f"{features}: found vertex {largest}; expected 0 to {n_points - 1}, the vertices of the mesh"
+        )

@@ -14,6 +14,7 @@ from anisomesh.errors import OptionError
 from anisomesh.mesh.surface import Surface
 from anisomesh.mesh.topology import edge_keys
 from anisomesh.repair.near_points import weld_distance
+from anisomesh.repair.t_junctions import ON_SIDE
 
 _MIN_SEARCH_RADIUS = 1e-12  # times the diagonal of the input: rounding of copied points
 
@@ -41,17 +42,45 @@ def tagged_edges(
 
     Notes
     -----
-    Repair merges and duplicates points, so the ends of the edges are found again by their positions.
+    Repair merges and duplicates points, so the ends of the edges are found again by their positions. It splits edges at
+    points that lie on them, so the edges along one that is gone are its parts.
     """
     ends = _checked_pairs(input_mesh, pairs)
     tree = cKDTree(prepared.points)
-    found = np.zeros(len(prepared.edges), dtype=bool)
     keys = edge_keys(prepared.edges)
     radius = _search_radius(input_mesh, tolerance)
     copies = [tree.query_ball_point(input_mesh.points[column], radius) for column in ends.T]
-    wanted = [(a, b) for first, second in zip(*copies, strict=True) for a in first for b in second if a != b]
-    if wanted:
-        found = np.isin(keys, edge_keys(np.array(wanted, dtype=np.int64)))
+    wanted = [
+        (a, b, k)
+        for k, (first, second) in enumerate(zip(*copies, strict=True))
+        for a in first
+        for b in second
+        if a != b
+    ]
+    table = np.array(wanted, dtype=np.int64).reshape(-1, 3)
+    wanted_keys = edge_keys(table[:, :2])
+    gone = np.ones(len(ends), dtype=bool)
+    gone[table[np.isin(wanted_keys, keys), 2]] = False
+    lines = input_mesh.points[ends[gone]]
+    limit = max(radius, ON_SIDE * input_mesh.diagonal)
+    parts = _along(prepared, lines[(lines[:, 0] != lines[:, 1]).any(axis=1)], limit)
+    return np.asarray(np.isin(keys, wanted_keys) | parts)
+
+
+def _along(surface: Surface, lines: npt.NDArray[np.float64], limit: float) -> EdgeMask:
+    """Return which edges (E,) have both ends and the middle within a distance of line segments (n, 2, 3)."""
+    found = np.zeros(len(surface.edges), dtype=bool)
+    if len(lines) == 0:
+        return found
+    segments = np.arange(2 * len(lines)).reshape(-1, 2)
+
+    def are_near(places: npt.NDArray[np.float64]) -> npt.NDArray[np.bool_]:
+        squares = igl.point_mesh_squared_distance(places, lines.reshape(-1, 3), segments)[0]
+        return np.asarray(squares <= limit**2)
+
+    chosen = np.flatnonzero(are_near(surface.points)[surface.edges].all(axis=1))
+    if len(chosen):
+        found[chosen] = are_near(surface.points[surface.edges[chosen]].mean(axis=1))
     return found
 
 

@@ -23,6 +23,7 @@ class Losses:
     def __init__(self) -> None:
         self._names: dict[str, list[str]] = {}
         self._others: list[str] = []
+        self._changed: list[str] = []
 
     def add(self, what: str, *names: str) -> None:
         """Add data of a kind, such as point data, with these names."""
@@ -32,6 +33,10 @@ class Losses:
     def say(self, what: str) -> None:
         """Add something else."""
         self._others.append(what)
+
+    def changed(self, name: str) -> None:
+        """Add a name that is written with other characters."""
+        self._changed.append(name)
 
     def features(self, mesh: Mesh) -> None:
         """Add the features and fixed points of a mesh."""
@@ -47,6 +52,8 @@ class Losses:
     def text(self) -> str:
         """Return everything in one line, empty if nothing is left out."""
         parts = [f"{what} {', '.join(map(repr, names))}" for what, names in self._names.items()]
+        if self._changed:
+            parts.append(f"some characters of {len(self._changed)} name(s) such as {self._changed[0]!r}")
         return "; ".join([*parts, *self._others])
 
 
@@ -150,11 +157,6 @@ def with_points_repeated(mesh: Mesh) -> tuple[Mesh, Integers]:
         point_data[name][place] = rows[corners]
     surface = Surface(own.points[source], place[numbers])
     return replace(mesh, surface=surface, point_data=point_data, corner_data={}), source
-
-
-def name_of(regions: Regions, label: int, otherwise: str = "") -> str:
-    """Return the name of a label in one line, or something else if it has none."""
-    return " ".join(regions.names.get(label, otherwise).split())
 
 
 def regions_as_integers(mesh: Mesh, divisions: Sequence[str]) -> dict[str, Integers]:

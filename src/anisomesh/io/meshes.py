@@ -13,7 +13,7 @@ import numpy as np
 import numpy.typing as npt
 
 from anisomesh.attributes.model import Mesh
-from anisomesh.errors import MeshError, MeshFileError
+from anisomesh.errors import MeshError, MeshFileError, why_unreadable
 from anisomesh.io import material_files
 from anisomesh.io.assemble import as_mesh
 from anisomesh.io.atomic import atomic_path
@@ -157,11 +157,11 @@ def _content(path: str | os.PathLike[str] | BinaryIO, file_format: str | None) -
         suffix = "" if file.is_dir() else known_suffix(file, file_format)
         return str(file), suffix, file.read_bytes()
     except FileNotFoundError as error:
-        raise MeshFileError(f"{file}: no such file; expected a mesh file") from error
+        raise MeshFileError(f"{file}: {why_unreadable(file, error)}; expected a mesh file") from error
     except IsADirectoryError as error:
         raise MeshFileError(f"{file}: is a folder; expected a mesh file") from error
     except OSError as error:
-        raise MeshFileError(f"{file}: cannot be read: {error.strerror or error}") from error
+        raise MeshFileError(f"{file}: {why_unreadable(file, error)}") from error
 
 
 def save(

@@ -10,7 +10,7 @@ from pathlib import Path
 import numpy as np
 import numpy.typing as npt
 
-from anisomesh.errors import MeshFileError
+from anisomesh.errors import MeshFileError, why_unreadable
 
 _SHOWN = 40  # characters of a wrong line that a message repeats
 _MAX_DIGITS = 18  # of a decimal number that fits in 64 bits
@@ -53,7 +53,7 @@ def _lines(path: str | os.PathLike[str], expected: str) -> Iterator[tuple[str, l
     try:
         text = Path(path).read_text(encoding="utf-8")
     except OSError as error:
-        raise MeshFileError(f"{path}: cannot be read: {error.strerror}; expected a text file, {expected}") from error
+        raise MeshFileError(f"{path}: {why_unreadable(path, error)}; expected a text file, {expected}") from error
     except UnicodeDecodeError as error:
         raise MeshFileError(f"{path}: cannot be read as text; expected {expected}") from error
     for number, line in enumerate(text.splitlines(), start=1):

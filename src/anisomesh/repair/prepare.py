@@ -191,7 +191,7 @@ def _repair_once(surface: Surface, tolerance: float) -> _RepairPass:
     if len(faces) == 0:
         raise MeshError(f"none of the {surface.n_faces:,} faces has an area; nothing is left after the repair")
     n_unique = len(faces)
-    faces, n_split = t_junctions.split_at_t_junctions(surface.points, faces, labels, tolerance)
+    faces, _, n_split = t_junctions.split_at_t_junctions(surface.points, faces, labels, tolerance)
     pairs, nonmanifold = orientation.pair_sides(faces, labels[faces])
     areas = 0.5 * np.linalg.norm(geometry.face_cross(surface.points, labels[faces]), axis=1)
     found = orientation.find_orientation(labels[faces], pairs, areas)
@@ -255,7 +255,7 @@ def _is_clean(surface: Surface, labels: PointLabels, tolerance: float) -> bool:
         and topology.count_nonmanifold_points(faces) == 0
         and not degenerate.is_degenerate(surface.points, labels[faces]).any()
         and duplicates.select_unique_faces(faces).all()
-        and t_junctions.split_at_t_junctions(surface.points, faces, labels, tolerance)[1] == 0
+        and t_junctions.split_at_t_junctions(surface.points, faces, labels, tolerance).n_split == 0
     )
 
 

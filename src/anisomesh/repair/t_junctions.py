@@ -11,7 +11,9 @@ from scipy.spatial import cKDTree
 from anisomesh._arrays import Faces, PointLabels, Points
 from anisomesh.mesh import topology
 
-_ON_SIDE = 1e-6  # distance of a point from a side that it is on, over the diagonal: coordinates rounded to float32
+ON_SIDE = 1e-6
+"""Distance of a point from a side that it is on, over the bounding-box diagonal: coordinates rounded to float32."""
+
 _SHORTEST_PART = 10.0  # of a split side, in such distances: nearer points are ends that are nearly equal; heuristic
 _CHUNK = 1_000  # sides looked at together
 
@@ -25,7 +27,15 @@ class _Junctions(NamedTuple):
     point: Integers
 
 
-def split_at_t_junctions(points: Points, faces: Faces, labels: PointLabels, tolerance: float) -> tuple[Faces, int]:
+class SplitFaces(NamedTuple):
+    """Faces with split sides (F', 3), the face that each is a part of (F',), and the number of split sides."""
+
+    faces: Faces
+    source: Integers
+    n_split: int
+
+
+def split_at_t_junctions(points: Points, faces: Faces, labels: PointLabels, tolerance: float) -> SplitFaces:
     """Return faces (F, 3) whose open sides are split where points of other open sides lie on them.
 
     Parameters
@@ -41,8 +51,8 @@ def split_at_t_junctions(points: Points, faces: Faces, labels: PointLabels, tole
 
     Returns
     -------
-    faces, count
-        The faces, and the number of sides that were split; one of each face at most, so another call may find more.
+    SplitFaces
+        At most one side of each face was split, so another call may find more.
 
     Notes
     -----
@@ -54,22 +64,23 @@ def split_at_t_junctions(points: Points, faces: Faces, labels: PointLabels, tole
     open_sides = np.flatnonzero(np.bincount(face_edges.ravel())[face_edges.ravel()] == 1)
     face, corner = np.divmod(open_sides, 3)
     apex, first, last = (welded[face, (corner + turn) % 3] for turn in range(3))
-    limit = max(tolerance, _ON_SIDE * float(np.linalg.norm(np.ptp(points, axis=0))))
+    limit = max(tolerance, ON_SIDE * float(np.linalg.norm(np.ptp(points, axis=0))))
     found = _points_on_sides(points, first, last, limit)
     chosen = _glued(first, last, found)
     _, one_of_face = np.unique(face[chosen], return_index=True)
     chosen = chosen[one_of_face]
     if len(chosen) == 0:
-        return faces, 0
+        return SplitFaces(faces, np.arange(len(faces)), 0)
     counts = np.ones(len(faces), dtype=np.int64)
     counts[face[chosen]] += np.bincount(found.side, minlength=len(face))[chosen]
-    split = np.repeat(faces, counts, axis=0)
+    source = np.repeat(np.arange(len(faces)), counts)
+    split = faces[source]
     place = np.cumsum(counts) - counts
     for side in chosen.tolist():
         chain = np.concatenate([[first[side]], found.point[found.side == side], [last[side]]])
         rows = place[face[side]] + np.arange(len(chain) - 1)
         split[rows] = np.stack([np.full(len(rows), apex[side]), chain[:-1], chain[1:]], axis=1)
-    return split, len(chosen)
+    return SplitFaces(split, source, len(chosen))
 
 
 def _points_on_sides(points: Points, first: Integers, last: Integers, limit: float) -> _Junctions:

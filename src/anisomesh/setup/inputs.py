@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 import numpy.typing as npt
@@ -20,12 +20,21 @@ from anisomesh.mesh.surface import Surface
 from anisomesh.metric.sizes import checked_sizes
 from anisomesh.metric.tensors import validate_metric
 from anisomesh.options import RemeshOptions
+from anisomesh.repair.carried_data import without_t_junctions
 from anisomesh.repair.near_points import weld_distance
-from anisomesh.repair.prepare import Prepared, prepare
+from anisomesh.repair.prepare import Prepared, PrepareReport, prepare
 from anisomesh.resolve import follows_creases, is_designed
 
 _MAX_BORDER_SHARE = 0.4  # of the vertices asked for, that borders and seams may take; heuristic
 _LARGEST_DENSITY = 1e30  # and inverse of the smallest, so that energies are far from overflow
+
+
+class Followed(NamedTuple):
+    """Edges (E,) to follow, what they are in words, and what has to be said about others, a sentence each."""
+
+    edges: EdgeMask
+    words: str
+    remarks: tuple[str, ...]
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -58,8 +67,8 @@ class PreparedInput:
     seams: EdgeMask
     fixed: PointMask
 
-    def features_at(self, n_vertices: int, surface: Surface) -> tuple[EdgeMask, tuple[str, ...]]:
-        """Return the edges (E,) to follow with a number of vertices, and what has to be said about the others.
+    def features_at(self, n_vertices: int, surface: Surface) -> Followed:
+        """Return the edges to follow with a number of vertices.
 
         ``surface`` is the prepared surface at bounding-box diagonal 1.
 
@@ -68,13 +77,17 @@ class PreparedInput:
         """
         spacing = even_edge_length(surface.area, n_vertices)
         followed, remarks = self.tagged.copy(), []
+        kinds = ["prescribed edges"] if followed.any() else []
         for what, edges in (("borders between regions", self.borders), ("seams of corner data", self.seams)):
             needed = float(surface.edge_lengths[edges | followed].sum()) / spacing
-            if edges.any() and needed > _MAX_BORDER_SHARE * n_vertices:
+            if not edges.any():
+                continue
+            if needed > _MAX_BORDER_SHARE * n_vertices:
                 remarks.append(f"edges do not follow all {what}, which would take about {needed:,.0f} vertices")
             else:
                 followed |= edges
-        return followed, tuple(remarks)
+                kinds.append(what)
+        return Followed(followed, " and ".join(kinds), tuple(remarks))
 
 
 def prepared_input(mesh: Mesh, options: RemeshOptions) -> PreparedInput:
@@ -108,7 +121,7 @@ def prepared_input(mesh: Mesh, options: RemeshOptions) -> PreparedInput:
         given = _at_prepared("size_field", options.size_field, (surface.n_points,), prepared, OptionError)
         sizes = checked_sizes(given, prepared.surface.points, prepared.point_source)
     prescribed = [mesh.features, *([] if options.features is None else [options.features])]
-    borders, seams = _borders(mesh, prepared.surface, options)
+    borders, seams = _borders(with_split_sides(mesh, prepared.report, options), prepared.surface, options)
     return PreparedInput(
         prepared=prepared,
         tensors=tensors,
@@ -119,6 +132,13 @@ def prepared_input(mesh: Mesh, options: RemeshOptions) -> PreparedInput:
         seams=seams,
         fixed=tagged_points(surface, mesh.fixed_points, prepared.surface, options.weld_tolerance),
     )
+
+
+def with_split_sides(mesh: Mesh, report: PrepareReport, options: RemeshOptions) -> Mesh:
+    """Return a mesh with sides of faces split as the repair has split them, so that borders and seams are edges."""
+    if mesh.is_bare or not (report.sides_split or report.faces_degenerate):
+        return mesh
+    return without_t_junctions(mesh, weld_distance(mesh.surface, options.weld_tolerance))
 
 
 def _tagged(
@@ -155,4 +175,7 @@ def _at_prepared(
     name: str, values: Any, shape: tuple[int, ...], prepared: Prepared, error: type[Exception]
 ) -> npt.NDArray[np.float64]:
     """Return values at the points of the input as values at the prepared points."""
-    return np.asarray(real_array(name, values, shape, error)[prepared.point_source])
+    given = real_array(name, values, shape if len(shape) > 1 else (None,), error)
+    if len(given) != shape[0]:
+        raise error(f"{name} has {len(given):,} values; expected {shape[0]:,}, one for each point of the mesh")
+    return np.asarray(given[prepared.point_source])

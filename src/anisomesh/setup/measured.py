@@ -29,6 +29,7 @@ from anisomesh.setup.inputs import PreparedInput
 logger = logging.getLogger(__name__)
 
 _FIRST_COUNT = 5_000  # vertices for which the metric is first measured, where their number is not known; heuristic
+_MAX_SMALLEST_SIZE = 1e5  # diagonals; above, lengths in the embedding are too small to compute with; heuristic
 _COUNT_ROUNDS, _COUNT_TOLERANCE = 4, 0.01  # of the measurement of the metric for the count found, and its change
 
 
@@ -52,6 +53,8 @@ class Measured:
         Which points of the surface are apexes, or fixed.
     field
         The metric on the working surface.
+    followed
+        What the tagged edges are, in words.
     remarks
         What a user should know, one sentence each.
     """
@@ -64,6 +67,7 @@ class Measured:
     tips: PointMask
     working: Surface
     field: MetricField
+    followed: str
     remarks: tuple[str, ...]
 
 
@@ -98,8 +102,8 @@ def measure(source: PreparedInput, n: int, options: RemeshOptions, run: Run) -> 
         frame = unit_frame(prepared.surface.points)
         surface = prepared.surface.with_points(frame.to_unit(prepared.surface.points))
         options = with_embedding_chosen(options, surface)
-        tagged, remarks = source.features_at(n, surface)
-        surface, tagged = _with_smooth_borders(surface, source, tagged, options.feature_angle)
+        followed = source.features_at(n, surface)
+        surface, tagged = _with_smooth_borders(surface, source, followed.edges, options.feature_angle)
         creases = sharp_edges(surface, min(options.feature_angle, WEAK_ANGLE))
         creases |= source.fixed[surface.edges].any(axis=1)  # so that the points stay
         split = working_surface(surface, n, creases=creases, tagged=tagged)
@@ -126,7 +130,8 @@ def measure(source: PreparedInput, n: int, options: RemeshOptions, run: Run) -> 
         tips=tips,
         working=working,
         field=field,
-        remarks=remarks,
+        followed=followed.words,
+        remarks=followed.remarks,
     )
 
 
@@ -164,4 +169,9 @@ def _prescribed(
         sizes = checked_sizes(sizes, places)
     low, high = (None if bound is None else bound / frame.scale for bound in (options.min_size, options.max_size))
     sizes = limited_sizes(surface, sizes / frame.scale, low=low, high=high, gradation=options.gradation)
+    if sizes.min() > _MAX_SMALLEST_SIZE:
+        raise OptionError(
+            f"size_field is at least {sizes.min() * frame.scale:g} everywhere; expected lengths that fit the mesh, "
+            f"whose bounding-box diagonal is {frame.scale:.4g}"
+        )
     return metric_of_sizes(sizes)

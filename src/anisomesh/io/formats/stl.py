@@ -10,8 +10,9 @@ import numpy as np
 from anisomesh._arrays import Points
 from anisomesh.attributes.model import Mesh, Regions
 from anisomesh.io.carried import Carried
+from anisomesh.io.formats.region_names import divide, in_words, region_texts
 from anisomesh.io.formats.words import BYTE_ORDER_MARK, format_rows
-from anisomesh.io.holding import Losses, by_label, main_division, name_of
+from anisomesh.io.holding import Losses, by_label, main_division
 from anisomesh.io.polygons import PolygonSoup
 from anisomesh.mesh.geometry import face_cross, unit
 from anisomesh.mesh.weld import coincident
@@ -69,11 +70,10 @@ def _take_solids(data: bytes, carried: Carried) -> None:
     """Add the solids, numbered from 1, if there are several or one has a name."""
     solids = list(_SOLID.finditer(data))
     texts = [" ".join(match[1].decode("utf-8", errors="replace").split()) for match in solids]
-    names = {k + 1: text for k, text in enumerate(texts) if text}
     facets = np.array([match.start() for match in _FACET.finditer(data)])
     labels = np.searchsorted(np.array([match.start() for match in solids]), facets)
-    if names or len(solids) > 1:
-        carried.add_cell_data(SOLID, labels, names=names)
+    if any(texts) or len(solids) > 1:
+        divide(carried, SOLID, labels, texts, range(1, len(solids) + 1))
 
 
 def _text_corners(text: bytes, remarks: list[str]) -> Points:
@@ -109,7 +109,8 @@ def stl_bytes(mesh: Mesh, losses: Losses) -> bytes:
     losses.add("materials", *mesh.materials)
     losses.features(mesh)
     if found is not None:
-        return _text(mesh, found[1]).encode("utf-8", errors="replace")
+        texts = region_texts(found[1], losses, in_words)
+        return _text(mesh, found[1], texts).encode("utf-8", errors="replace")
     rows = np.zeros(len(faces), dtype=_TRIANGLE)
     with np.errstate(over="ignore"):
         rows["corners"] = points[faces]
@@ -121,13 +122,12 @@ def stl_bytes(mesh: Mesh, losses: Losses) -> bytes:
     return b"binary STL".ljust(_HEADER_BYTES - 4) + len(faces).to_bytes(4, "little") + rows.tobytes()
 
 
-def _text(mesh: Mesh, solids: Regions) -> str:
+def _text(mesh: Mesh, solids: Regions, texts: dict[int, str]) -> str:
     """Return a text file with a solid for each region, in the order of their labels."""
     points, faces = mesh.surface.points, mesh.surface.faces
     table = np.concatenate([unit(face_cross(points, faces)), points[faces].reshape(-1, 9)], axis=1)
     parts = []
     for (label,), chosen in by_label(solids.labels):
-        name = name_of(solids, label)
         rows = format_rows(_FACET_LINES, table[chosen])
-        parts.append(f"solid {name}\n{rows}endsolid {name}\n")
+        parts.append(f"solid {texts[label]}\n{rows}endsolid {texts[label]}\n")
     return "".join(parts)

@@ -15,6 +15,7 @@ from anisomesh.io.formats.gltf.attributes import Attributes
 from anisomesh.io.formats.gltf.document import Document
 from anisomesh.io.formats.gltf.materials import read_materials
 from anisomesh.io.formats.gltf.read import MATERIAL, NODE
+from anisomesh.io.formats.region_names import divide
 from anisomesh.io.polygons import PolygonSoup
 
 TRIMESH = "trimesh"
@@ -97,10 +98,10 @@ class _Parts:
         carried.point_data |= self._point_data.together(carried)
         for name, values in self._face_data.together(carried, "faces").items():
             carried.add_cell_data(name, values)
-        names = {k: name for k, (name, _) in enumerate(self._nodes) if name}
-        if names or len(self._nodes) > 1:
-            labels = np.repeat(np.arange(len(self._nodes)), [count for _, count in self._nodes])
-            carried.add_cell_data(NODE, labels, names=names)
+        texts = [name for name, _ in self._nodes]
+        if any(texts) or len(texts) > 1:
+            labels = np.repeat(np.arange(len(texts)), [count for _, count in self._nodes])
+            divide(carried, NODE, labels, texts, range(len(texts)))
         if self._materials:
             given = {k: str(getattr(one, "name", None) or "") for k, one in enumerate(self._materials)}
             names = {k: name for k, name in given.items() if name and not _NAMED_BY_TRIMESH.fullmatch(name)}

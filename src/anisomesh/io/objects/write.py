@@ -14,9 +14,10 @@ from anisomesh.attributes.model import Mesh, Regions
 from anisomesh.io.carried import COLOUR, UV, Array, Integers
 from anisomesh.io.formats.gltf.read import MATERIAL, NODE
 from anisomesh.io.formats.gltf.write import glb_bytes
+from anisomesh.io.formats.region_names import region_texts
 from anisomesh.io.formats.vtk.data import ORIGINAL_POINT
 from anisomesh.io.formats.vtk.write import active_names, vtk_polygons
-from anisomesh.io.holding import Losses, by_label, continuous_corner_data, name_of, with_points_repeated
+from anisomesh.io.holding import Losses, by_label, continuous_corner_data, with_points_repeated
 from anisomesh.io.objects.read import CELL_SET, MESHIO_DIVISIONS
 from anisomesh.io.objects.trimesh_scenes import TRIMESH
 from anisomesh.mesh.surface import Surface
@@ -133,11 +134,12 @@ def to_trimesh(mesh: Mesh) -> Any:
     held = ["unit", *(name for name in (TRIMESH, "gltf") if isinstance(mesh.materials.get(name), Mapping))]
     losses.add("materials", *(name for name in mesh.materials if name not in held))
     none = np.zeros(mesh.surface.n_faces, dtype=np.int64)
+    texts = {} if nodes is None else region_texts(nodes, losses, distinct=True)
     scene = trimesh.Scene()
     for (node, material), faces in by_label(*(none if d is None else d.labels for d in (nodes, materials))):
         part = _trimesh_part(mesh, np.sort(faces), table.get(material))
         part.face_attributes.update({name: mesh.regions[name].labels[np.sort(faces)] for name in others})
-        name = "" if nodes is None else name_of(nodes, node)
+        name = texts.get(node, "")
         scene.add_geometry(part, node_name=name or None, geom_name=name or None)
     _warn("trimesh", losses)
     is_scene = len(scene.geometry) > 1 or nodes is not None

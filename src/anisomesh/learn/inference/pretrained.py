@@ -5,7 +5,7 @@ from __future__ import annotations
 import os
 from pathlib import Path
 
-from anisomesh.errors import OptionError
+from anisomesh.errors import OptionError, missing_folder
 from anisomesh.toml import hint
 
 DEFAULT_NETWORK = "default"
@@ -39,7 +39,10 @@ def weights_path(weights: str | os.PathLike[str] | None) -> Path:
     known = pretrained_networks()
     path = _WEIGHTS_FOLDER / f"{name}.safetensors" if name in known else Path(name)
     if not path.is_file():
+        folder = missing_folder(path)
+        missing = f"; the folder {folder} does not exist" if folder else ""
         raise OptionError(
-            f"{name} is neither a file of weights nor a pretrained network ({', '.join(known)}){hint(name, known)}"
+            f"{name} is neither a file of weights nor a pretrained network ({', '.join(known)})"
+            f"{missing or hint(name, known)}"
         )
     return path

@@ -15,10 +15,14 @@ from anisomesh.io.cells import SurfaceCells, strip_triangles
 from anisomesh.io.formats.gltf.attributes import Attributes, read_attributes
 from anisomesh.io.formats.gltf.document import Document, index_of
 from anisomesh.io.formats.gltf.materials import read_materials
+from anisomesh.io.formats.region_names import divide, is_number
 from anisomesh.io.polygons import Integers, PolygonSoup
 
 NODE, MATERIAL = "node", "material"
 """Names of the divisions into the nodes of the scene and into materials."""
+
+NO_MATERIAL = -1
+"""Label of faces without a material."""
 
 TRIANGLES, _STRIP, _FAN = 4, 5, 6  # modes of a primitive; lower ones are points and lines
 _COPIES = "EXT_mesh_gpu_instancing"
@@ -75,16 +79,20 @@ class _Scene:
             carried.point_data |= self._attributes.together(carried)
         nodes, materials = np.concatenate(self._nodes), np.concatenate(self._materials)
         with carried.optional("its nodes"):
-            names = {label: self._node_name(label) for label in np.unique(nodes).tolist()}
-            names = {label: name for label, name in names.items() if name}
-            if names or len(np.unique(nodes)) > 1:
-                carried.add_cell_data(NODE, nodes, names=names)
+            used = np.unique(nodes).tolist()
+            texts = [self._node_name(label) for label in used]
+            if any(texts) or len(used) > 1:
+                divide(carried, NODE, nodes, texts, used)
         with carried.optional("its materials"):
             if (materials >= 0).any():
-                given = enumerate(self._json["materials"])
-                names = {k: str(material["name"]) for k, material in given if material.get("name")}
-                carried.add_cell_data(MATERIAL, materials, names=names)
-                carried.materials["gltf"] = read_materials(self._document)
+                given = self._json["materials"]
+                texts = [str(material.get("name", "")) for material in given]
+                if any(map(is_number, texts)) and all(material.keys() == {"name"} for material in given):
+                    divide(carried, MATERIAL, materials, texts, range(len(texts)))
+                else:
+                    names = {k: text for k, text in enumerate(texts) if text}
+                    carried.add_cell_data(MATERIAL, materials, names=names)
+                    carried.materials["gltf"] = read_materials(self._document)
         left = [name for name in _NOT_KEPT if self._json.get(name)]
         primitives = [part for mesh in self._json.get("meshes", []) for part in mesh["primitives"]]
         left += ["morph targets"] if any("targets" in part for part in primitives) else []
@@ -129,9 +137,9 @@ class _Scene:
             if np.linalg.det(matrix[:3, :3]) < 0.0:
                 triangles = triangles[:, ::-1]  # a reflection turns triangles inside out
             self._cells.add("triangle", triangles + self._first_point(primitive, points, matrix))
-            material = primitive.get("material", -1)
+            material = primitive.get("material", NO_MATERIAL)
             self._nodes.append(np.full(len(triangles), node))
-            self._materials.append(np.full(len(triangles), material if isinstance(material, int) else -1))
+            self._materials.append(np.full(len(triangles), material if isinstance(material, int) else NO_MATERIAL))
 
     def _first_point(self, primitive: dict[str, Any], points: npt.NDArray[Any], matrix: npt.NDArray[np.float64]) -> int:
         """Return the first of the vertices of a primitive, which are added unless another one shares them."""

@@ -13,8 +13,9 @@ from anisomesh.io.carried import Integers
 from anisomesh.io.formats.gltf.attributes import Encoded, encoded
 from anisomesh.io.formats.gltf.document import BINARY_CHUNK, COMPONENTS, JSON_CHUNK, WIDTHS
 from anisomesh.io.formats.gltf.materials import write_materials
-from anisomesh.io.formats.gltf.read import MATERIAL, NODE, TRIANGLES
-from anisomesh.io.holding import Losses, by_label, distinct_corners, main_division, name_of
+from anisomesh.io.formats.gltf.read import MATERIAL, NO_MATERIAL, NODE, TRIANGLES
+from anisomesh.io.formats.region_names import region_texts
+from anisomesh.io.holding import Losses, by_label, distinct_corners, main_division
 from anisomesh.io.objects.trimesh_scenes import TRIMESH, materials_as_gltf
 
 _ALIGNMENT = 4  # bytes
@@ -48,7 +49,7 @@ def glb_bytes(mesh: Mesh, losses: Losses) -> bytes:
     """
     if float(np.abs(mesh.surface.points).max()) > float(np.finfo(np.float32).max):
         raise ValueError("coordinates beyond 3.4e38 do not fit the float32 of GLB; use PLY instead")
-    nodes, materials, names = _divisions(mesh, losses)
+    nodes, materials = _divisions(mesh, losses)
     losses.add("face data", *mesh.face_data)
     theirs = mesh.materials.get(TRIMESH)
     held = ("gltf", TRIMESH) if isinstance(theirs, Mapping) else ("gltf",)
@@ -59,34 +60,51 @@ def glb_bytes(mesh: Mesh, losses: Losses) -> bytes:
     if given is None and isinstance(theirs, Mapping):
         given = materials_as_gltf(theirs)
     given = given if isinstance(given, dict) else {}
-    count = len(given.get("materials", []))
     labels = [np.zeros(mesh.surface.n_faces, dtype=np.int64) if d is None else d.labels for d in (nodes, materials)]
-    numbers = {label: k for k, label in enumerate(names)}
-    if given:
-        numbers = {label: label for label in names if label < count}
+    numbers, names = _material_numbers(materials, given, losses)
     primitives: dict[int, list[dict[str, Any]]] = {}
     for (node, material), chosen in by_label(*labels):
         primitive = _primitive(mesh, np.sort(chosen), writer, attributes)
         if material in numbers:
             primitive["material"] = numbers[material]
         primitives.setdefault(node, []).append(primitive)
+    texts = {} if nodes is None else region_texts(nodes, losses)
     for node, parts in primitives.items():
-        writer.add_node(parts, "" if nodes is None else name_of(nodes, node))
+        writer.add_node(parts, texts.get(node, ""))
     if given:
         write_materials(given, writer.document, writer.binary)
-    elif materials is not None and names:
-        writer.document["materials"] = [{"name": name_of(materials, label, f"{MATERIAL} {label}")} for label in names]
+    elif names:
+        writer.document["materials"] = [{"name": name} for name in names]
     return writer.content()
 
 
-def _divisions(mesh: Mesh, losses: Losses) -> tuple[Regions | None, Regions | None, list[int]]:
-    """Return the divisions into nodes and into materials, and the labels of the latter that are materials."""
+def _divisions(mesh: Mesh, losses: Losses) -> tuple[Regions | None, Regions | None]:
+    """Return the divisions into nodes and into materials."""
     others = {name: regions for name, regions in mesh.regions.items() if name != MATERIAL}
     found = main_division(others, NODE)
     losses.add("regions", *(name for name in others if found is None or name != found[0]))
-    materials = mesh.regions.get(MATERIAL)
-    labels = [] if materials is None else [label for label in np.unique(materials.labels).tolist() if label >= 0]
-    return None if found is None else found[1], materials, labels
+    return None if found is None else found[1], mesh.regions.get(MATERIAL)
+
+
+def _material_numbers(
+    materials: Regions | None, given: dict[str, Any], losses: Losses
+) -> tuple[dict[int, int], list[str]]:
+    """Return the number of the material of each label, and the names of new materials; -1 without a name is none.
+
+    With ``given`` materials the labels are their numbers.
+    """
+    if materials is None:
+        return {}, []
+    labels = np.unique(materials.labels).tolist()
+    if len(labels) > 1 and NO_MATERIAL not in materials.names:
+        labels = [label for label in labels if label != NO_MATERIAL]
+    if given:
+        numbers = {label: label for label in labels if 0 <= label < len(given.get("materials", []))}
+        if len(numbers) < len(labels):
+            losses.add("regions", MATERIAL)
+        return numbers, []
+    texts = region_texts(materials, losses)
+    return {label: k for k, label in enumerate(labels)}, [texts[label] for label in labels]
 
 
 def _primitive(mesh: Mesh, chosen: Integers, writer: _Writer, attributes: list[_Attribute]) -> dict[str, Any]:

@@ -2,15 +2,19 @@
 
 from __future__ import annotations
 
+import json
 import re
 from collections.abc import Iterator
 
 import numpy as np
 
 from anisomesh.io.carried import Array, Carried, Integers, grouped_columns, is_region
-from anisomesh.io.formats.gmsh.elements import Entities
+from anisomesh.io.formats.gmsh.elements import PHYSICAL, Entities
 from anisomesh.io.formats.gmsh.numbers import NumberStream
 from anisomesh.io.formats.words import whole
+
+COMMENT = "anisomesh regions"
+"""Beginning of the comment that names divisions and regions, in JSON."""
 
 _SURFACE = 2  # dimension
 _SKIPPED = (b"ElementNodeData", b"Periodic", b"GhostElements", b"PartitionedEntities")
@@ -28,6 +32,36 @@ def sections(data: bytes, name: bytes) -> Iterator[bytes]:
         at = stop + len(end)
 
 
+def read_comments(data: bytes, carried: Carried) -> dict[str, dict[int, str]]:
+    """Return the names of regions by division that a comment of ours has."""
+    for section in sections(data, b"Comments"):
+        for line in section.splitlines():
+            if line.startswith(COMMENT.encode()):
+                with carried.optional("the names of regions"):
+                    given = json.loads(line[len(COMMENT) :])
+                    return {
+                        str(name): {int(label): str(text) for label, text in names.items()}
+                        for name, names in given.items()
+                    }
+    return {}
+
+
+def name_regions(carried: Carried, named: dict[str, dict[int, str]], surface: Integers) -> None:
+    """Make cell data divisions that have names of regions, or are called as divisions usually are.
+
+    ``surface`` are the numbers of the cells (n,) that count.
+    """
+    for name, values in list(carried.cell_data.items()):
+        if (name in named or is_region(name)) and _are_integers(values[surface]):
+            del carried.cell_data[name]
+            labels = np.zeros(len(values), dtype=np.int64)
+            labels[surface] = whole(values[surface])
+            carried.add_cell_data(name, labels, names=named.get(name))
+    for name, names in named.items():
+        if name in carried.divisions:
+            carried.divisions[name].names.update(names)
+
+
 def read_physical_names(data: bytes, carried: Carried) -> None:
     """Name the physical groups of surfaces; the names of others are left out with a remark."""
     others = []
@@ -36,8 +70,8 @@ def read_physical_names(data: bytes, carried: Carried) -> None:
             text = name.decode("utf-8", errors="replace")
             if int(dimension) != _SURFACE:
                 others.append(text)
-            elif "physical" in carried.divisions:
-                carried.divisions["physical"].names[int(number)] = text
+            elif PHYSICAL in carried.divisions:
+                carried.divisions[PHYSICAL].names[int(number)] = text
     if others:
         named = ", ".join(others)
         carried.remarks.append(
@@ -92,10 +126,7 @@ def read_data(data: bytes, numbers: NumberStream, carried: Carried, tags: tuple[
                 else:
                     columns[key] = values
         for key, values in grouped_columns(columns).items():
-            if into is carried.point_data:
-                into[key] = values
-            else:
-                carried.add_cell_data(key, whole(values) if is_region(key) and _are_integers(values) else values)
+            into[key] = values
 
 
 def _are_integers(values: Array) -> bool:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Collection
 from typing import Any
 
 import numpy as np
@@ -30,6 +31,9 @@ _NAMES = {kind: name for name, kinds in _GMSH_OTHERS.items() for kind in kinds}
 _N_NODES = {**_TRIANGLES, **_QUADS, **{kind: n for kinds in _GMSH_OTHERS.values() for kind, n in kinds.items()}}
 
 _QUADRATIC_LINE = 8
+
+PHYSICAL, GEOMETRICAL = "physical", "geometrical"
+"""Names of the divisions into physical groups and into entities."""
 
 Entities = dict[tuple[int, int], int]  # first physical group of an entity, by dimension and tag
 
@@ -84,20 +88,28 @@ class Elements:
         elif kind == POINT:
             self._points.append(self._table.found(nodes[tags[:, 1] != 0])[:, 0])
 
-    def carry(self, carried: Carried) -> Integers:
-        """Add lines, points and divisions to what the file carries; return the numbers of the elements (n,)."""
+    def carry(self, carried: Carried, named: Collection[str]) -> Integers:
+        """Add lines, points and divisions to what the file carries; return the numbers of the elements (n,).
+
+        Divisions that are ``named`` are added in any case, others only if they are not trivial.
+        """
         carried.lines += self._lines
         carried.fixed_points += self._points
         table = np.zeros((self._count, 3), dtype=np.int64)
         for source, tags in self._tags:
             table[source] = tags
-        physical, entity = table[np.concatenate(self._surface)][:, 1:].T
-        if physical.any():
-            carried.add_cell_data("physical", table[:, 1], names={})
-        if len(np.unique(entity)) > 1 and (entity != entities_of(physical)).any():
-            carried.add_cell_data("geometrical", table[:, 2], names={})
+        physical, entity = table[self.surface][:, 1:].T
+        if physical.any() or PHYSICAL in named:
+            carried.add_cell_data(PHYSICAL, table[:, 1], names={})
+        if GEOMETRICAL in named or (len(np.unique(entity)) > 1 and (entity != entities_of(physical)).any()):
+            carried.add_cell_data(GEOMETRICAL, table[:, 2], names={})
         numbers: Integers = table[:, 0]
         return numbers
+
+    @property
+    def surface(self) -> Integers:
+        """Numbers of the cells of the surface (n,)."""
+        return np.concatenate(self._surface)
 
 
 def entities_of(physical: Integers) -> Integers:

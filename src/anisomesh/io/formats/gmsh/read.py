@@ -11,7 +11,13 @@ import numpy as np
 import numpy.typing as npt
 
 from anisomesh.io.carried import Carried
-from anisomesh.io.formats.gmsh.data import read_data, read_entities, read_physical_names
+from anisomesh.io.formats.gmsh.data import (
+    name_regions,
+    read_comments,
+    read_data,
+    read_entities,
+    read_physical_names,
+)
 from anisomesh.io.formats.gmsh.elements import Elements, TagTable, elements_2_binary, elements_2_text, elements_4
 from anisomesh.io.formats.gmsh.numbers import NumberStream
 from anisomesh.io.formats.words import whole
@@ -43,9 +49,11 @@ def read_msh(data: bytes) -> PolygonSoup:
         elements_2_binary(section, elements)
     else:
         elements_2_text(section, elements)
-    cell_numbers = elements.carry(carried)
+    named = read_comments(data, carried)
+    cell_numbers = elements.carry(carried, named)
     read_physical_names(data, carried)
     read_data(data, numbers, carried, (tags, cell_numbers))
+    name_regions(carried, named, elements.surface)
     return elements.cells.soup(points, carried=carried)
 
 

@@ -2,20 +2,22 @@
 
 from __future__ import annotations
 
+import json
 from collections.abc import Mapping
 
 import numpy as np
 
 from anisomesh.attributes.model import Mesh, Regions
 from anisomesh.io.carried import Array, Integers, separate_columns
-from anisomesh.io.formats.gmsh.elements import LINE, POINT, TRIANGLE, entities_of
+from anisomesh.io.formats.gmsh.data import COMMENT
+from anisomesh.io.formats.gmsh.elements import LINE, PHYSICAL, POINT, TRIANGLE, entities_of
+from anisomesh.io.formats.region_names import in_a_line, region_texts
 from anisomesh.io.holding import (
     Losses,
     continuous_corner_data,
     flat_rows,
     is_exact_in_float64,
     main_division,
-    name_of,
     numeric,
 )
 
@@ -32,6 +34,7 @@ def msh_bytes(mesh: Mesh, losses: Losses) -> bytes:
     """
     points, faces = mesh.surface.points, mesh.surface.faces
     physical, geometrical, others = _divisions(mesh, losses)
+    names = {} if physical is None else region_texts(physical, Losses(), _quotable)
     nodes = np.zeros(len(points), dtype=[("tag", "<i4"), ("xyz", "<f8", 3)])
     nodes["tag"], nodes["xyz"] = np.arange(1, len(points) + 1), points
     labels = np.zeros(len(faces), dtype=np.int64) if physical is None else physical.labels
@@ -42,11 +45,15 @@ def msh_bytes(mesh: Mesh, losses: Losses) -> bytes:
     ]
     n_others = len(mesh.features) + len(mesh.fixed_points)
     point_data = {**mesh.point_data, **continuous_corner_data(mesh, losses)}
+    for name in (*point_data, *mesh.face_data):
+        if _quotable(name) != name:
+            losses.changed(name)
     losses.add("materials", *mesh.materials)
     return b"".join(
         [
             b"$MeshFormat\n2.2 1 8\n" + (1).to_bytes(4, "little") + b"\n$EndMeshFormat\n",
-            _physical_names(physical),
+            _comments(mesh, physical, names),
+            _physical_names(physical, names),
             b"$Nodes\n%d\n" % len(points) + nodes.tobytes() + b"\n$EndNodes\n",
             b"$Elements\n%d\n" % (len(faces) + n_others) + b"".join(parts) + b"\n$EndElements\n",
             *_data("NodeData", _exact(point_data, "point data", losses), 0),
@@ -76,12 +83,10 @@ def _divisions(mesh: Mesh, losses: Losses) -> tuple[Regions | None, Integers, di
     physical = None if found is None else usable.pop(found[0])
     if entities is not None:
         geometrical = entities.labels
-        losses.names_of_regions(mesh, "geometrical")
     elif physical is not None:
         geometrical = entities_of(physical.labels)
     else:
         geometrical = np.ones(mesh.surface.n_faces, dtype=np.int64)
-    losses.names_of_regions(mesh, *usable)
     return physical, geometrical, {name: regions.labels for name, regions in usable.items()}
 
 
@@ -95,15 +100,29 @@ def _elements(kind: int, nodes: Array, physical: Integers | int, entity: Integer
     return np.array([kind, len(nodes), 2], dtype="<i4").tobytes() + rows.tobytes()
 
 
-def _physical_names(physical: Regions | None) -> bytes:
-    if physical is None or not physical.names:
+def _comments(mesh: Mesh, physical: Regions | None, names: Mapping[int, str]) -> bytes:
+    """Return the names of divisions and regions that no section of Gmsh has, in a section that it skips."""
+    kept = {name: dict(regions.names) for name, regions in mesh.regions.items() if regions is not physical}
+    if physical is not None:
+        changed = {label: text for label, text in physical.names.items() if text and names.get(label, text) != text}
+        if changed or not physical.labels.any():
+            kept[PHYSICAL] = changed
+    if not kept:
         return b""
-    lines = [f'2 {label} "{_quoted(name_of(physical, label))}"' for label in physical.names]
+    text = json.dumps(kept).replace("$", "\\u0024")  # with which sections begin
+    return f"$Comments\n{COMMENT} {text}\n$EndComments\n".encode()
+
+
+def _physical_names(physical: Regions | None, names: Mapping[int, str]) -> bytes:
+    given = {} if physical is None else {label: text for label, text in names.items() if physical.names.get(label)}
+    if not given:
+        return b""
+    lines = [f'2 {label} "{text}"' for label, text in given.items()]
     return "\n".join(["$PhysicalNames", str(len(lines)), *lines, "$EndPhysicalNames\n"]).encode()
 
 
-def _quoted(text: str) -> str:
-    return text.replace('"', "'")
+def _quotable(text: str) -> str:
+    return in_a_line(text).replace('"', "'")
 
 
 def _data(section: str, data: dict[str, Array], n_others: int) -> list[bytes]:
@@ -116,7 +135,7 @@ def _data(section: str, data: dict[str, Array], n_others: int) -> list[bytes]:
         rows = np.zeros(count, dtype=[("tag", "<i4"), ("values", "<f8", (width,))])
         rows["tag"], rows["values"] = np.arange(1, count + 1), np.nan
         rows["values"][: len(values)] = values.reshape(-1, width)
-        head = f'${section}\n1\n"{_quoted(" ".join(name.split()))}"\n1\n0\n3\n0\n{width}\n{count}\n'
+        head = f'${section}\n1\n"{_quotable(name)}"\n1\n0\n3\n0\n{width}\n{count}\n'
         found.append(head.encode() + rows.tobytes() + f"\n$End{section}\n".encode())
     return found
 

@@ -23,8 +23,10 @@ def medit_bytes(mesh: Mesh, losses: Losses) -> bytes:
     vertices = np.zeros(len(points), dtype=np.int64)
     found = main_division(mesh.regions, REFERENCE)
     losses.add("regions", *(name for name in mesh.regions if found is None or name != found[0]))
-    if found is not None:
+    if found is not None and found[1].labels.any():
         losses.names_of_regions(mesh, found[0])
+    elif found is not None:
+        losses.add("regions", found[0])  # 0 is the reference of faces without one
     references = np.zeros(len(faces), dtype=np.int64) if found is None else found[1].labels
     point_data = {**mesh.point_data, **continuous_corner_data(mesh, losses)}
     given, normals = point_data.pop(REFERENCE, None), point_data.pop(NORMAL, None)

@@ -6,6 +6,7 @@ import numpy as np
 
 from anisomesh.io.carried import COLOUR, NORMAL, UV, Array, Carried, Integers
 from anisomesh.io.formats.obj.lines import Lines
+from anisomesh.io.formats.region_names import divide
 from anisomesh.io.formats.words import LINES_AT_ONCE, quick_numbers, word_starts
 
 SMOOTHING = "smoothing_group"
@@ -116,7 +117,8 @@ def take_divisions(file: Lines, carried: Carried) -> None:
             labels = np.array([0, *(number[text] for text in texts)], dtype=np.int64)
             of_faces = labels[np.searchsorted(given, file.face_lines)]
             if of_faces.any():
-                carried.add_cell_data(name, of_faces, names={k: text for text, k in number.items()})
+                before = [0] if (of_faces == 0).any() else []  # the label in front of the first one
+                divide(carried, name, of_faces, [*[""] * len(before), *number], [*before, *number.values()])
     with carried.optional("its smoothing groups"):
         given = file.of(b"s")
         labels = np.array([0, *(0 if file.rest(k) in ("off", "") else int(file.rest(k)) for k in given)])

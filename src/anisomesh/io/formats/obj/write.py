@@ -6,11 +6,12 @@ from itertools import pairwise
 
 import numpy as np
 
-from anisomesh.attributes.model import Mesh, Regions
+from anisomesh.attributes.model import Mesh
 from anisomesh.io.carried import COLOUR, NORMAL, UV, Array, Integers
 from anisomesh.io.formats.obj.attributes import DIVISIONS, SMOOTHING
+from anisomesh.io.formats.region_names import in_words, region_texts
 from anisomesh.io.formats.words import format_rows
-from anisomesh.io.holding import Losses, main_division, name_of
+from anisomesh.io.holding import Losses, main_division
 
 _FREE = ("object", "group")  # words that take a division that OBJ does not know
 
@@ -85,7 +86,7 @@ def _states(mesh: Mesh, losses: Losses) -> list[tuple[str, Integers, dict[int, s
             found[slot] = regions.pop(other[0])
     losses.add("regions", *regions)
     states = [
-        (word.decode(), found[name].labels, _texts(name, found[name]))
+        (word.decode(), found[name].labels, region_texts(found[name], losses, in_words, distinct=True))
         for name, word in DIVISIONS.items()
         if name in found
     ]
@@ -96,15 +97,6 @@ def _states(mesh: Mesh, losses: Losses) -> list[tuple[str, Integers, dict[int, s
         labels = smoothing.astype(np.int64)
         states.append(("s", labels, {label: str(label) if label else "off" for label in np.unique(labels).tolist()}))
     return states
-
-
-def _texts(division: str, regions: Regions) -> dict[int, str]:
-    """Return a different text for each label: its name if it has one."""
-    texts: dict[int, str] = {}
-    for label in np.unique(regions.labels).tolist():
-        text = name_of(regions, label) or f"{division}_{label}"
-        texts[label] = f"{text}_{label}" if text in texts.values() else text
-    return texts
 
 
 def _faces(columns: list[Integers | None], states: list[tuple[str, Integers, dict[int, str]]], count: int) -> str:
@@ -128,14 +120,8 @@ def _faces(columns: list[Integers | None], states: list[tuple[str, Integers, dic
     for first, end in pairwise(begin):
         now = labels[order[first]].tolist()
         for k, (word, _, texts) in enumerate(states):
-            if now[k] != before[k] and not (before[k] is None and _is_nothing(word, now[k], texts)):
+            if now[k] != before[k] and not (before[k] is None and word == "s" and now[k] == 0):
                 lines.append(f"{word} {texts[now[k]]}\n")
                 before[k] = now[k]
         lines.append(format_rows(pattern, table[order[first:end]]))
     return "".join(lines)
-
-
-def _is_nothing(word: str, label: int, texts: dict[int, str]) -> bool:
-    """Return whether faces in front of the first line of a kind have this label: 0 without a name."""
-    names = {value.decode(): key for key, value in DIVISIONS.items()}
-    return label == 0 and (word == "s" or texts[0] == f"{names[word]}_0")

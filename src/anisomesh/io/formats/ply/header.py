@@ -20,6 +20,9 @@ _BYTE_ORDERS = {"ascii": "", "binary_little_endian": "<", "binary_big_endian": "
 REGIONS = "regions"
 """First word of comments that make a property of faces a division: its name, a label, and the name of the label."""
 
+NAME = "name"
+"""First word of comments that give data a name that is not one word: the element, the property, and the name."""
+
 TEXTURE_FILE = "TextureFile"
 """First word of comments that name a texture."""
 

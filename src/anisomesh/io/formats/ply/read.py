@@ -2,12 +2,15 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 import numpy as np
 
 from anisomesh.io.carried import COLOUR, NORMAL, UV, Array, Carried, Integers, grouped_columns
 from anisomesh.io.cells import SurfaceCells, strip_triangles
 from anisomesh.io.formats.ply.body import BinaryBody, PropertyValues, TextBody
-from anisomesh.io.formats.ply.header import REGIONS, TEXTURE_FILE, Element, read_header
+from anisomesh.io.formats.ply.header import NAME, REGIONS, TEXTURE_FILE, Element, read_header
+from anisomesh.io.formats.region_names import unquoted
 from anisomesh.io.formats.words import whole
 from anisomesh.io.polygons import PolygonSoup
 
@@ -160,4 +163,15 @@ def _take_comments(comments: list[str], carried: Carried) -> None:
                 del carried.cell_data[words[1]]
         with carried.optional("a name of regions"):
             if words[1] in carried.divisions and len(words) == 4:
-                carried.divisions[words[1]].names[int(words[2])] = words[3]
+                carried.divisions[words[1]].names[int(words[2])] = unquoted(words[3])
+    for line in comments:
+        words = line.split(maxsplit=3)
+        if len(words) == 4 and words[0] == NAME:
+            at_faces = (carried.cell_data, carried.corner_data, carried.divisions)
+            for data in (carried.point_data,) if words[1] == "vertex" else at_faces:
+                _rename(data, words[2], unquoted(words[3]))
+
+
+def _rename(data: dict[str, Any], name: str, other: str) -> None:
+    if name in data and other not in data:
+        data[other] = data.pop(name)

@@ -8,8 +8,9 @@ import numpy as np
 
 from anisomesh.attributes.model import Mesh
 from anisomesh.io.carried import COLOUR, NORMAL, UV, Array, separate_columns
-from anisomesh.io.formats.ply.header import PLY_TYPES, REGIONS, TEXTURE_FILE
-from anisomesh.io.holding import Losses, flat_rows, is_exact_in_float64, name_of, numeric, regions_as_integers
+from anisomesh.io.formats.ply.header import NAME, PLY_TYPES, REGIONS, TEXTURE_FILE
+from anisomesh.io.formats.region_names import quoted
+from anisomesh.io.holding import Losses, flat_rows, is_exact_in_float64, numeric, regions_as_integers
 
 _COLUMNS = {  # names of the columns of arrays, by name and width
     (COLOUR, 3): ("red", "green", "blue"),
@@ -52,7 +53,7 @@ def ply_bytes(mesh: Mesh, losses: Losses) -> bytes:
         ends = mesh.features.astype(np.int32)
         elements.append(("edge", {"vertex1": ends[:, 0], "vertex2": ends[:, 1]}, {}))
     header, body = ["ply", "format binary_little_endian 1.0"], []
-    header += [f"comment {line}" for line in (*comments, *_names_of_regions(mesh, face))]
+    header += [f"comment {line}" for line in (*comments, *_names_of_data(mesh), *_names_of_regions(mesh, face))]
     for name, scalars, of_lists in elements:
         lines, rows = _element(scalars, of_lists)
         header += [f"element {name} {len(rows)}", *lines]
@@ -120,8 +121,20 @@ def _names_of_regions(mesh: Mesh, face: Mapping[str, Array]) -> list[str]:
     for name, division in mesh.regions.items():
         if _word(name) in face:
             lines.append(f"{REGIONS} {_word(name)}")
-            lines += [f"{REGIONS} {_word(name)} {label} {name_of(division, label)}" for label in division.names]
+            names = {label: text for label, text in division.names.items() if text}
+            lines += [f"{REGIONS} {_word(name)} {label} {quoted(text)}" for label, text in names.items()]
     return lines
+
+
+def _names_of_data(mesh: Mesh) -> list[str]:
+    """Return the comments that give data and divisions the names that are not one word."""
+    of_elements = (("vertex", mesh.point_data), ("face", {**mesh.face_data, **mesh.corner_data, **mesh.regions}))
+    return [
+        f"{NAME} {element} {_word(name)} {quoted(name)}"
+        for element, data in of_elements
+        for name in data
+        if _word(name) != name
+    ]
 
 
 def _word(name: str) -> str:

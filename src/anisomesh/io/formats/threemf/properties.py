@@ -7,6 +7,7 @@ from typing import Protocol
 import numpy as np
 
 from anisomesh.io.carried import COLOUR, Carried, Integers
+from anisomesh.io.formats.region_names import divide
 
 OBJECT, MATERIAL = "object", "material"
 """Names of the divisions into objects and into base materials."""
@@ -77,14 +78,14 @@ class Properties:
     def carry(self, carried: Carried) -> None:
         """Add the divisions into objects and materials, and the colours of corners."""
         if len(self._names) > 1 or any(self._names):
-            labels = np.repeat(np.arange(1, len(self._names) + 1), self._counts)
-            names = {k + 1: name for k, name in enumerate(self._names) if name}
-            carried.add_cell_data(OBJECT, labels, names=names)
+            usual = np.arange(1, len(self._names) + 1)
+            divide(carried, OBJECT, np.repeat(usual, self._counts), self._names, usual.tolist())
         materials = np.concatenate([np.zeros(0, dtype=np.int64), *self._materials])
         if materials.any():
-            names = {label: name for (name, _), label in self._known.items() if name}
-            carried.add_cell_data(MATERIAL, materials, names=names)
-            carried.materials["display_colours"] = {label: colour for (_, colour), label in self._known.items()}
+            names, given = [name for name, _ in self._known], list(self._known.values())
+            label_of = divide(carried, MATERIAL, materials, names, given)
+            colours_of = {label_of[label]: colour for (_, colour), label in self._known.items()}
+            carried.materials["display_colours"] = colours_of
         colours = np.concatenate([np.zeros((0, 3, 4), dtype=np.int64), *self._colours])
         if (colours != 255).any():
             carried.corner_data[COLOUR] = colours.reshape(-1, 4).astype(np.uint8)

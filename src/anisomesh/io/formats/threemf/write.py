@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import io
+import re
 import zipfile
 from collections.abc import Mapping
 from typing import Any
@@ -12,15 +13,17 @@ import numpy as np
 
 from anisomesh.attributes.model import Mesh, Regions
 from anisomesh.io.carried import COLOUR, Array, Integers
+from anisomesh.io.formats.region_names import region_texts
 from anisomesh.io.formats.threemf.properties import MATERIAL, OBJECT
 from anisomesh.io.formats.threemf.read import CORE, MATERIALS, MODEL_TYPE, ROOT
 from anisomesh.io.formats.words import format_rows
-from anisomesh.io.holding import Losses, by_label, main_division, name_of
+from anisomesh.io.holding import Losses, by_label, main_division
 
 _DATE = (1980, 1, 1, 0, 0, 0)  # of all entries, so that the same mesh gives the same file
 _GREY = "#808080FF"
 _MATERIAL_GROUP, _COLOUR_GROUP, _FIRST_OBJECT = 1, 2, 3  # numbers of resources
 _HEAD = '<?xml version="1.0" encoding="UTF-8"?>\n'
+_NOT_IN_XML = re.compile("[^\t\n\r\x20-\ud7ff\ue000-\ufffd\U00010000-\U0010ffff]")
 _UNITS = ("micron", "millimeter", "centimeter", "inch", "foot", "meter")
 
 
@@ -38,7 +41,7 @@ def threemf_bytes(mesh: Mesh, losses: Losses) -> bytes:
     losses.add("regions", *(name for name in others if found is None or name != found[0]))
     losses.add("face data", *mesh.face_data)
     losses.features(mesh)
-    objects = _objects(mesh, None if found is None else found[1], properties)
+    objects = _objects(mesh, None if found is None else found[1], properties, losses)
     items = "".join(f'<item objectid="{_FIRST_OBJECT + k}"/>' for k in range(len(objects)))
     unit = mesh.materials.get("unit", "millimeter")
     losses.add("materials", *(name for name in mesh.materials if name not in ("unit", "display_colours")))
@@ -62,7 +65,7 @@ def _properties(mesh: Mesh, losses: Losses) -> tuple[str, Array]:
     losses.add("point data", *(name for name in mesh.point_data if name != COLOUR or rgba is None))
     losses.add("corner data", *(name for name in mesh.corner_data if name != COLOUR or rgba is None))
     if materials is not None:
-        return _materials(mesh, materials)
+        return _materials(mesh, materials, losses)
     if rgba is None:
         return "", np.full(n_faces, "")
     table, numbers = np.unique(rgba.reshape(-1, 4), axis=0, return_inverse=True)
@@ -72,14 +75,15 @@ def _properties(mesh: Mesh, losses: Losses) -> tuple[str, Array]:
     return f'<m:colorgroup id="{_COLOUR_GROUP}">{entries}</m:colorgroup>', np.array(attributes)
 
 
-def _materials(mesh: Mesh, materials: Regions) -> tuple[str, Array]:
+def _materials(mesh: Mesh, materials: Regions, losses: Losses) -> tuple[str, Array]:
     """Return the group of base materials and the attributes of triangles; label 0 without a name stands for none."""
     given = mesh.materials.get("display_colours")
     displayed = given if isinstance(given, Mapping) else {}
-    labels = [label for label in np.unique(materials.labels).tolist() if label > 0 or label in materials.names]
+    texts = region_texts(materials, losses, _in_xml, distinct=True)
+    labels = [label for label in texts if label != 0 or label in materials.names or len(texts) == 1]
     entries = []
     for label in labels:
-        name = quoteattr(name_of(materials, label, f"{MATERIAL} {label}"))
+        name = quoteattr(texts[label])
         entries.append(f'<base name={name} displaycolor="{displayed.get(label) or _GREY}"/>')
     attributes = np.full(mesh.surface.n_faces, "", dtype=object)
     for k, label in enumerate(labels):
@@ -101,16 +105,17 @@ def _rgba(colours: Array) -> Array | None:
     return np.rint(255.0 * shares).astype(np.uint8)
 
 
-def _objects(mesh: Mesh, division: Regions | None, properties: Array) -> list[str]:
+def _objects(mesh: Mesh, division: Regions | None, properties: Array, losses: Losses) -> list[str]:
     """Return the objects, each with its points."""
     points, faces = mesh.surface.points, mesh.surface.faces.astype(np.int64)
     if division is None:
         return [_object(_FIRST_OBJECT, "", points, faces, properties)]
-    objects = []
+    objects, texts = [], region_texts(division, losses, _in_xml)
     for k, ((label,), chosen) in enumerate(by_label(division.labels)):
         used, corners = np.unique(faces[chosen], return_inverse=True)
-        name = name_of(division, label)
-        objects.append(_object(_FIRST_OBJECT + k, name, points[used], corners.reshape(-1, 3), properties[chosen]))
+        objects.append(
+            _object(_FIRST_OBJECT + k, texts[label], points[used], corners.reshape(-1, 3), properties[chosen])
+        )
     return objects
 
 
@@ -121,6 +126,11 @@ def _object(number: int, name: str, points: Array, faces: Integers, properties: 
     mesh = f"<mesh><vertices>\n{vertices}</vertices><triangles>\n{triangles}</triangles></mesh>"
     named = f" name={quoteattr(name)}" if name else ""
     return f'<object id="{number}" type="model"{named}>{mesh}</object>'
+
+
+def _in_xml(text: str) -> str:
+    """Return a text without the characters that XML does not allow."""
+    return _NOT_IN_XML.sub(" ", text)
 
 
 def _archive(model: str) -> bytes:

@@ -110,8 +110,8 @@ def names_of_regions(fields: dict[str, Array], carried: Carried) -> dict[str, di
 
 def _labels(text: str) -> dict[int, str]:
     found = {}
-    for line in text.splitlines():
-        match = re.fullmatch(r"(-?\d{1,18})(?: (.*))?", line)
+    for line in text.split("\n"):
+        match = re.fullmatch(r"(-?\d{1,18})(?: (.*))?", line, re.DOTALL)
         if match is None:
             raise ValueError(f"{line[:40]!r} is not a label and its name")
         if match[2]:

@@ -13,13 +13,13 @@ import numpy.typing as npt
 from anisomesh._arrays import Points
 from anisomesh.attributes.model import Mesh
 from anisomesh.io.carried import NORMAL, UV, Array
+from anisomesh.io.formats.region_names import in_a_line, region_texts
 from anisomesh.io.formats.vtk.arrays import packed_array, string_codes, type_name
 from anisomesh.io.formats.vtk.data import NAMES_OF_REGIONS, ORIGINAL_POINT
 from anisomesh.io.holding import (
     Losses,
     continuous_corner_data,
     flat_rows,
-    name_of,
     numeric,
     regions_as_integers,
     with_points_repeated,
@@ -96,7 +96,8 @@ def _data(mesh: Mesh, losses: Losses) -> tuple[dict[str, Array], dict[str, Array
     cell_data |= regions_as_integers(mesh, list(mesh.regions))
     fields = {}
     for name, division in mesh.regions.items():
-        lines = [f"{label} {name_of(division, label)}" for label in division.names]
+        texts = region_texts(division, losses, in_a_line)
+        lines = [f"{label} {text}" for label, text in texts.items() if division.names.get(label)]
         text = "\n".join(lines or [str(division.labels[0])])
         fields[NAMES_OF_REGIONS + name] = np.frombuffer(text.encode("utf-8", errors="replace"), np.uint8)
     given = mesh.materials.get("field_data", {})

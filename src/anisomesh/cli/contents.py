@@ -1,0 +1,83 @@
+"""What a mesh carries besides its surface, as facts for JSON and in a few lines."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from anisomesh.cli.report import counted
+
+if TYPE_CHECKING:
+    from collections.abc import Mapping
+
+    from anisomesh.attributes.model import Array, Mesh, Regions
+
+_MAX_NAMED = 6  # regions of a division in a line of text
+_DATA_TITLES = {"point_data": "point data", "face_data": "face data", "corner_data": "corner data"}
+_UNIT_OF_FORMAT = {".3mf": "millimeter", ".glb": "meter"}  # where the file names none, by specification
+
+
+def contents(mesh: Mesh, suffix: str) -> dict[str, Any]:
+    """Return what a mesh carries, for JSON: lengths in model units, areas in their square.
+
+    ``suffix`` is the extension of the format, in lower case with the dot.
+    """
+    ends = mesh.surface.points[mesh.features]
+    unit = mesh.materials.get("unit")
+    return {
+        "unit": unit if isinstance(unit, str) else _UNIT_OF_FORMAT.get(suffix),
+        "regions": {name: _regions(regions, mesh.surface.face_areas) for name, regions in mesh.regions.items()},
+        **{kind: _arrays(getattr(mesh, kind), 2 if kind == "corner_data" else 1) for kind in _DATA_TITLES},
+        "prescribed_edges": {
+            "count": len(mesh.features),
+            "length": float(np.linalg.norm(ends[:, 1] - ends[:, 0], axis=1).sum()),
+        },
+        "fixed_points": len(mesh.fixed_points),
+        "materials": sorted(mesh.materials),
+    }
+
+
+def _regions(regions: Regions, areas: Array) -> list[dict[str, Any]]:
+    labels, own = np.unique(regions.labels, return_inverse=True)
+    own = own.reshape(-1)
+    faces, area = np.bincount(own), np.bincount(own, areas)
+    return [
+        {"label": label, "name": regions.names.get(label), "faces": int(faces[k]), "area": float(area[k])}
+        for k, label in enumerate(labels.tolist())
+    ]
+
+
+def _arrays(data: Mapping[str, Array], n_leading: int) -> dict[str, dict[str, Any]]:
+    """Return the type and the components of arrays, with so many dimensions in front of them."""
+    return {
+        name: {"type": values.dtype.name, "components": int(np.prod(values.shape[n_leading:], dtype=np.int64))}
+        for name, values in data.items()
+    }
+
+
+def contents_rows(facts: dict[str, Any]) -> list[tuple[str, str]]:
+    """Return the lines of text for :func:`contents`, of what there is."""
+    rows = [("unit", facts["unit"])] if facts["unit"] else []
+    for name, regions in facts["regions"].items():
+        texts = [str(region["name"] or region["label"]) for region in regions]
+        more = f" and {len(texts) - _MAX_NAMED:,} more" if len(texts) > _MAX_NAMED else ""
+        rows.append(("regions", f"{name}: {len(texts):,} ({', '.join(texts[:_MAX_NAMED])}{more})"))
+    for kind, title in _DATA_TITLES.items():
+        if facts[kind]:
+            rows.append((title, ", ".join(_array_text(name, facts[kind][name]) for name in facts[kind])))
+    edges = facts["prescribed_edges"]
+    if edges["count"]:
+        rows.append(("prescribed", f"{counted(edges['count'], 'edge')} of length {edges['length']:.6g}"))
+    if facts["fixed_points"]:
+        rows.append(("fixed", counted(facts["fixed_points"], "point")))
+    others = [name for name in facts["materials"] if name != "unit"]
+    if others:
+        rows.append(("materials", ", ".join(others)))
+    return rows
+
+
+def _array_text(name: str, fact: dict[str, Any]) -> str:
+    width = f" x {fact['components']}" if fact["components"] > 1 else ""
+    what = ", texture coordinates" if name.rstrip("0123456789") == "uv" else ""
+    return f"{name} ({fact['type']}{width}{what})"

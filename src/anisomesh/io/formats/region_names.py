@@ -1,0 +1,128 @@
+"""Regions as texts, for formats that have no numbers of regions, or not every name."""
+
+from __future__ import annotations
+
+import json
+import re
+from collections.abc import Callable, Sequence
+
+import numpy as np
+
+from anisomesh.attributes.model import Regions
+from anisomesh.io.carried import Carried, Division, Integers
+from anisomesh.io.holding import Losses
+
+_NUMBERED = "region_"  # in front of the number of a region without a name
+_NUMBER = re.compile(rf"{_NUMBERED}(-?\d{{1,18}})")
+
+
+def exactly(text: str) -> str:
+    """Return a name as it is."""
+    return text
+
+
+def in_words(text: str) -> str:
+    """Return a name with single blanks between its words, for formats that are read by words."""
+    return " ".join(text.split()).rstrip("\\")
+
+
+def in_a_line(text: str) -> str:
+    """Return a name without line breaks."""
+    return " ".join(text.split("\n"))
+
+
+def region_texts(
+    regions: Regions, losses: Losses, written: Callable[[str], str] = exactly, *, distinct: bool = False
+) -> dict[int, str]:
+    """Return a text for each region, in the order of their labels: its name, or a text that has its number.
+
+    Parameters
+    ----------
+    regions
+        The regions.
+    losses
+        Names that the format changes are added.
+    written
+        Returns a name as the format can write it.
+    distinct
+        Whether regions with equal texts would become one, so that the second one's is made another.
+    """
+    texts: dict[int, str] = {}
+    for label in np.unique(regions.labels).tolist():
+        name = regions.names.get(label, "")
+        text = written(name) or f"{_NUMBERED}{label}"
+        texts[label] = f"{text}_{label}" if distinct and text in texts.values() else text
+        if name and texts[label] != name:
+            losses.changed(name)
+    return texts
+
+
+def is_number(text: str) -> bool:
+    """Return whether a text stands for a region without a name, by its number."""
+    return _NUMBER.fullmatch(text) is not None
+
+
+def numbered_regions(texts: Sequence[str], usual: Sequence[int]) -> tuple[list[int], dict[int, str]]:
+    """Return the labels of regions with some texts, and the names of labels.
+
+    Parameters
+    ----------
+    texts
+        Their texts in the file, empty for none.
+    usual
+        The labels that they have unless their texts, as :func:`region_texts` makes them, say another.
+    """
+    given = [int(match[1]) if (match := _NUMBER.fullmatch(text)) else None for text in texts]
+    given = [number if number not in given[:k] else None for k, number in enumerate(given)]
+    taken = {number for number in given if number is not None}
+    labels, names = [], {}
+    for number, text, label in zip(given, texts, usual, strict=True):
+        if number is None:
+            while label in taken:
+                label += 1
+            taken.add(label)
+            if text:
+                names[label] = text
+        labels.append(label if number is None else number)
+    return labels, names
+
+
+def quoted(text: str) -> str:
+    """Return a text for the end of a line of words: as it is, or in quotes with escapes if it would not come back."""
+    is_plain = text and text == " ".join(text.split()) and text.isprintable() and not text.startswith('"')
+    return text if is_plain else json.dumps(text)
+
+
+def unquoted(text: str) -> str:
+    """Return the text that :func:`quoted` has made another of."""
+    try:
+        return str(json.loads(text)) if text.startswith('"') else text
+    except ValueError:
+        return text
+
+
+def divide(carried: Carried, name: str, labels: Integers, texts: Sequence[str], usual: Sequence[int]) -> dict[int, int]:
+    """Add a division of faces into regions that a file gives as texts.
+
+    Parameters
+    ----------
+    carried
+        The division is added here.
+    name
+        Name of the division.
+    labels
+        The region of each face (n,), as one of ``usual``.
+    texts, usual
+        As for :func:`numbered_regions`.
+
+    Returns
+    -------
+    dict
+        The label of each region by the usual one.
+    """
+    numbers, names = numbered_regions(texts, usual)
+    label_of = dict(zip(usual, numbers, strict=True))
+    codes, places = np.unique(labels, return_inverse=True)
+    table = np.array([label_of.get(code, code) for code in codes.tolist()], dtype=np.int64)
+    carried.divisions[name] = Division(labels=table[places.reshape(-1)], names=names)
+    return label_of
