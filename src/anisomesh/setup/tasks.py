@@ -81,6 +81,8 @@ def set_up(source: PreparedInput, n: int, options: RemeshOptions, run: Run, *, n
             error_weights=weights,
         )
         plan = fit_plan(options, surface, nearest=nearest)
+        if plan is not None and source.junctions is not None:  # a decimation of sheets would not fit together
+            plan = replace(plan, decimation=None)
         metric = PlacedMetric(ClosestPoints(working), field if weights is None else asked)
         prescribed = bool(source.tagged.any())
         target = None
