@@ -77,7 +77,8 @@ _LEGEND = (
 def faults(row: RunRow) -> list[str]:
     """Return the faults of the result of a row in words."""
     validity = row["evaluation"]["validity"]
-    found = [name for name in ("nonmanifold_edges", "nonmanifold_vertices", "flat", "inverted") if validity.get(name)]
+    names = ("nonmanifold_edges", "nonmanifold_vertices", "flat", "inverted")
+    found = [name for name in names if validity.get(name) and not validity.get(f"{name}_input")]
     if not validity["oriented"]:
         found.append("not oriented")
     if validity["euler"] != validity["euler_input"]:

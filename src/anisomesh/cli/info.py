@@ -34,10 +34,12 @@ def describe(surface: Surface) -> dict[str, Any]:
     The genus is the sum over the components, with every boundary loop closed by a disk. It is None unless the surface
     is an oriented manifold.
     """
+    from anisomesh.junctions.cut import cut_at_junctions
     from anisomesh.repair.prepare import prepare
 
     validity = _validity(surface)
     prepared = prepare(surface)
+    junctions = cut_at_junctions(prepared)
     low, high = surface.points.min(axis=0), surface.points.max(axis=0)
     lengths = surface.edge_lengths
     return {
@@ -53,6 +55,10 @@ def describe(surface: Surface) -> dict[str, Any]:
             "changes": prepared.report.lines(),
             "points": prepared.surface.n_points,
             "faces": prepared.surface.n_faces,
+        },
+        "junctions": {
+            "edges": prepared.report.edges_nonmanifold_cut,
+            "curves": 0 if junctions is None else len(junctions.graph.curves),
         },
         "hints": hints(prepared.surface),
     }
@@ -99,5 +105,9 @@ def _text(facts: dict[str, Any]) -> str:
     if prepare["changes"]:
         size = f"{counted(prepare['points'], 'point')}, {counted(prepare['faces'], 'face')}"
         rows.append(("prepared", size))
+    if facts["junctions"]["curves"]:
+        edges = counted(facts["junctions"]["edges"], "edge")
+        curves = counted(facts["junctions"]["curves"], "curve")
+        rows.append(("junctions", f"{edges} with more than two faces, in {curves}: cut apart, and joined in the result"))
     rows += [("hint", hint) for hint in facts["hints"]]
     return f"{facts['file']}\n{table(rows)}"
