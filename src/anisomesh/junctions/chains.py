@@ -118,9 +118,10 @@ class _Chained:
         A node takes the nearest point; if another node is nearer to that, it gets a new point.
         """
         points, places = placed.points, placed.places
-        offset = np.mod(places[None] - wanted[:, None] + 0.5 * length, length) - 0.5 * length
-        nearest = np.argmin(np.abs(offset), axis=1)
-        distance = np.abs(offset[np.arange(len(wanted)), nearest])
+        after = np.searchsorted(places, wanted, side="right")
+        before, after = (after - 1) % len(points), after % len(points)
+        behind, ahead = np.mod(wanted - places[before], length), np.mod(places[after] - wanted, length)
+        nearest, distance = np.where(behind <= ahead, before, after), np.minimum(behind, ahead)
         taken: dict[int, int] = {}
         for node in np.argsort(distance, kind="stable").tolist():
             taken.setdefault(int(nearest[node]), node)

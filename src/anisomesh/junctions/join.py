@@ -196,8 +196,10 @@ def _settled(conforming: Conforming, task: MeshingTask, n: int) -> ValidMesh | N
     apart = mesh.points[:0]  # points that keep edges from becoming one
     for _ in range(_MAX_ROUNDS):
         sheets = Surface(mesh.points, mesh.faces)
-        twice = _coincident_edges(sheets, seam)
-        n_joined = int(seam.joined(sheets).max()) + 1
+        joined = seam.joined(sheets)
+        if (joined[sheets.edges[:, 0]] == joined[sheets.edges[:, 1]]).any():
+            return None
+        twice, n_joined = _coincident_edges(sheets, seam), int(joined.max()) + 1
         if len(twice) == 0 and n_joined == n:
             return mesh
         if len(twice):
