@@ -28,8 +28,8 @@ from anisomesh.features.tagged import distance_to_crease_edges
 from anisomesh.fitting.target import FitTarget
 from anisomesh.fitting.valid import fit_without_faults
 from anisomesh.io.describe import soundness
-from anisomesh.junctions.join import JoinTask, sites_for
 from anisomesh.io.meshes import mesh_of
+from anisomesh.junctions.join import JoinTask, sites_for
 from anisomesh.mesh.surface import Surface
 from anisomesh.mesh.validity import Validity, check_validity
 from anisomesh.metric.conformity import Conformity, MetricExtent, conformity

@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+from junction_shapes import SHAPES, lengths_by_count
 
 import anisomesh
 from anisomesh.attributes.model import Mesh, Regions
@@ -9,7 +10,6 @@ from anisomesh.junctions import join
 from anisomesh.mesh.distance import surface_distance
 from anisomesh.mesh.surface import Surface
 from anisomesh.mesh.topology import connected_components, euler_characteristic
-from tests.reference.junction_shapes import SHAPES, lengths_by_count
 
 QUICK = [("wavy_fin", 0.3), ("two_boxes", 0.6), ("cubes_at_an_edge", 10.0), ("soap_films", 0.3)]
 CASES = [(name, ratio * (30.0 if name == "cubes_at_an_edge" else 1.0)) for name in SHAPES for ratio in (0.15, 0.3, 0.8)]

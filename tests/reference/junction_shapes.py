@@ -79,7 +79,7 @@ def boxes(nx, ny, nz, n=4):
 def cubes_at_an_edge():
     """Two cubes of twelve triangles each with an edge in common."""
     points, faces = boxes(1, 1, 1, n=1)
-    return glued((points, faces), (points + [1, 1, 0], faces))
+    return glued((points, faces), (points + np.array([1, 1, 0]), faces))
 
 
 def disc_in_tube():

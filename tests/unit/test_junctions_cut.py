@@ -2,12 +2,12 @@
 
 import numpy as np
 import pytest
+from junction_shapes import SHAPES, lengths_by_count, square
 
 from anisomesh.junctions.cut import cut_at_junctions
 from anisomesh.mesh import topology
 from anisomesh.mesh.surface import Surface
 from anisomesh.repair.prepare import prepare
-from tests.reference.junction_shapes import SHAPES, lengths_by_count, square
 
 FACES_AND_CURVES = {  # faces at each curve, sorted, and distinct places of nodes
     "wavy_fin": ([3], 2),

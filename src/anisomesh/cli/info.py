@@ -108,6 +108,6 @@ def _text(facts: dict[str, Any]) -> str:
     if facts["junctions"]["curves"]:
         edges = counted(facts["junctions"]["edges"], "edge")
         curves = counted(facts["junctions"]["curves"], "curve")
-        rows.append(("junctions", f"{edges} with more than two faces, in {curves}: cut apart, and joined in the result"))
+        rows.append(("junctions", f"{edges} with more than two faces, in {curves}: joined again in the result"))
     rows += [("hint", hint) for hint in facts["hints"]]
     return f"{facts['file']}\n{table(rows)}"

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from itertools import pairwise
 
 import numpy as np
 import numpy.typing as npt
@@ -125,7 +126,7 @@ def _ends_and_meetings(
         after = edge_keys(np.stack([own, np.roll(own, -1)], axis=1))
         before, on = np.roll(after, 1), np.isin(after, keys)
         is_node[own[(on != np.roll(on, 1)) | (on & (before == after))]] = True
-    return is_node
+    return np.asarray(is_node)
 
 
 def _curves(keys: Ints, is_node: PointMask) -> list[Ints]:
@@ -146,8 +147,8 @@ def _curves(keys: Ints, is_node: PointMask) -> list[Ints]:
             while not is_node[curve[-1]]:
                 first, second = beside[curve[-1]]
                 curve.append(second if first == curve[-2] else first)
-            used.update(zip(curve, curve[1:], strict=False))
-            used.update(zip(curve[1:], curve, strict=False))
+            used.update(pairwise(curve))
+            used.update(pairwise(curve[::-1]))
             curves.append(np.array(curve, dtype=np.int64))
     return curves
 
@@ -159,10 +160,10 @@ def _loop(
     at = np.flatnonzero(is_node[joined[points]])
     if len(at) == 0:
         return Loop(points=points, arcs=())
-    points, at = np.roll(points, -at[0]), [*(at - at[0]).tolist(), len(points)]
+    points, bounds = np.roll(points, -at[0]), [*(at - at[0]).tolist(), len(points)]
     own = joined[np.append(points, points[0])].astype(np.int64)
     arcs = []
-    for first, last in zip(at, at[1:], strict=False):
+    for first, last in pairwise(bounds):
         curve, k = place.get(int(edge_keys(own[None, first : first + 2])[0]), (FREE, 0))
         backward = curve != FREE and int(curves[curve][k]) != int(own[first])
         arcs.append(Arc(first=first, last=last, curve=curve, backward=backward))

@@ -159,21 +159,28 @@ class JoinTask:
             return None
         made = conform(found.points, found.faces, found.bundles)
         seam = _seam(made.points, made.chains)
-        points, faces, _ = remove_inverted_triangles(made.points, made.faces, task.reference, deadline=task.deadline)
-        creases = mesh.crease_edges
-        if points is not made.points:
-            creases = renumbered(made.points, points)[creases]
-        creases = edges_left(faces, creases)
-        roots = transfer_metric_roots(task.embedded_reference, task.roots, points)
-        faces = flip_for_shape(points, faces, roots, task.reference, kept=creases)
-        mesh = replace(mesh, points=points, faces=faces, crease_edges=edges_left(faces, creases))
-        settled = _settled(Conforming(mesh, seam), task, self.n_vertices)
-        return None if settled is None or seam.join(Surface(settled.points, settled.faces)) is None else Conforming(settled, seam)
+        tidy = _tidied(replace(mesh, points=made.points, faces=made.faces), task)
+        settled = _settled(Conforming(tidy, seam), task, self.n_vertices)
+        if settled is None or seam.join(Surface(settled.points, settled.faces)) is None:
+            return None
+        return Conforming(settled, seam)
 
     def joined(self, conforming: Conforming) -> Surface | None:
         """Return the joined sheets of a mesh, None if that would join more than its seam."""
         settled = _settled(conforming, self.task, self.n_vertices)
         return None if settled is None else conforming.seam.join(Surface(settled.points, settled.faces))
+
+
+def _tidied(mesh: ValidMesh, task: MeshingTask) -> ValidMesh:
+    """Return a mesh with inverted triangles repaired, and edges flipped where that makes better triangles."""
+    points, faces, _ = remove_inverted_triangles(mesh.points, mesh.faces, task.reference, deadline=task.deadline)
+    creases = mesh.crease_edges
+    if points is not mesh.points:
+        creases = renumbered(mesh.points, points)[creases]
+    creases = edges_left(faces, creases)
+    roots = transfer_metric_roots(task.embedded_reference, task.roots, points)
+    faces = flip_for_shape(points, faces, roots, task.reference, kept=creases)
+    return replace(mesh, points=points, faces=faces, crease_edges=edges_left(faces, creases))
 
 
 def _seam(points: Points, chains: tuple[Ints, ...]) -> Seam:

@@ -153,7 +153,6 @@ class _Samples:
     def _queries(self, points: Floats, directions: Floats) -> Floats:
         return np.concatenate([points / self.scale, directions], axis=1)
 
-
     def in_order(self, points: Floats, directions: Floats) -> Floats:
         """Return the arc lengths (n,) on one loop of places (n, 3) around it, in their order and near in all."""
         table = cdist(self._queries(points, directions), self.coordinates, "sqeuclidean")

@@ -10,6 +10,7 @@ import numpy as np
 import numpy.typing as npt
 
 from anisomesh._arrays import Faces, Points
+
 _REACH = 0.7  # distances to the next vertices, up to which two vertices become one; heuristic
 
 Ints = npt.NDArray[np.int64]
@@ -190,9 +191,7 @@ def _matched(wanted: Floats, places: Floats, length: float) -> dict[int, int]:
     return dict(chosen)
 
 
-def _insert_others(
-    vertices: list[_Vertex], row: int, chain: Chain, points: Points, length: float
-) -> None:
+def _insert_others(vertices: list[_Vertex], row: int, chain: Chain, points: Points, length: float) -> None:
     """Insert the points of a chain that no vertex is matched with, in the order of the chain."""
     inner, places = chain.points[1:-1], chain.places[1:-1]
     ends = points[chain.points[[0, -1]]]
