@@ -56,10 +56,7 @@ def describe(surface: Surface) -> dict[str, Any]:
             "points": prepared.surface.n_points,
             "faces": prepared.surface.n_faces,
         },
-        "junctions": {
-            "edges": prepared.report.edges_nonmanifold_cut,
-            "curves": 0 if junctions is None else len(junctions.graph.curves),
-        },
+        "junction_curves": 0 if junctions is None else len(junctions.graph.curves),
         "hints": hints(prepared.surface),
     }
 
@@ -105,9 +102,10 @@ def _text(facts: dict[str, Any]) -> str:
     if prepare["changes"]:
         size = f"{counted(prepare['points'], 'point')}, {counted(prepare['faces'], 'face')}"
         rows.append(("prepared", size))
-    if facts["junctions"]["curves"]:
-        edges = counted(facts["junctions"]["edges"], "edge")
-        curves = counted(facts["junctions"]["curves"], "curve")
-        rows.append(("junctions", f"{edges} with more than two faces, in {curves}: joined again in the result"))
+    if facts["junction_curves"]:
+        curves = counted(facts["junction_curves"], "curve")
+        rows.append(
+            ("junctions", f"{curves} with more than two faces at each edge; sheets are joined there in the result")
+        )
     rows += [("hint", hint) for hint in facts["hints"]]
     return f"{facts['file']}\n{table(rows)}"

@@ -9,11 +9,11 @@ import numpy as np
 import numpy.typing as npt
 
 from anisomesh._arrays import Faces, Points
+from anisomesh.conforming.boundary_places import LoopPlaces, boundary_places
+from anisomesh.conforming.chains import Bundle, Chain, with_split_sides
 from anisomesh.junctions.cut import Junctions
 from anisomesh.junctions.graph import Loop
 from anisomesh.mesh.surface import Surface
-from anisomesh.meshops.boundary_places import LoopPlaces, boundary_places
-from anisomesh.meshops.conform import Bundle, Chain, with_split_sides
 
 Ints = npt.NDArray[np.int64]
 Floats = npt.NDArray[np.float64]

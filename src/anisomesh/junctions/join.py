@@ -8,6 +8,7 @@ import numpy as np
 import numpy.typing as npt
 
 from anisomesh._arrays import EdgeMask, PointLabels, Points
+from anisomesh.conforming.chains import conform
 from anisomesh.delaunay.feature_mesh import edges_left, renumbered
 from anisomesh.delaunay.meshing import MeshingTask, ValidMesh
 from anisomesh.junctions.chains import bundled
@@ -16,14 +17,13 @@ from anisomesh.mesh.geometry import Frame, even_edge_length
 from anisomesh.mesh.surface import Surface
 from anisomesh.mesh.topology import edge_keys
 from anisomesh.meshops.change import apply_changes
-from anisomesh.meshops.conform import conform
 from anisomesh.meshops.decimation import decimate
 from anisomesh.meshops.flip import flip_for_shape
 from anisomesh.meshops.inverted import remove_inverted_triangles
 from anisomesh.meshops.split import edge_split, split_longest_edges
 from anisomesh.metric.transfer import transfer_metric_roots
 
-_MAX_ROUNDS = 10  # of changes until no edges coincide and the number of vertices is right
+_MAX_SETTLING_ROUNDS = 10  # of changes until no edges coincide and the number of vertices is right
 
 Ints = npt.NDArray[np.int64]
 
@@ -201,7 +201,7 @@ def _settled(conforming: Conforming, task: MeshingTask, n: int) -> ValidMesh | N
     """
     mesh, seam = conforming.mesh, conforming.seam
     apart = mesh.points[:0]  # points that keep edges from becoming one
-    for _ in range(_MAX_ROUNDS):
+    for _ in range(_MAX_SETTLING_ROUNDS):
         sheets = Surface(mesh.points, mesh.faces)
         joined = seam.joined(sheets)
         if (joined[sheets.edges[:, 0]] == joined[sheets.edges[:, 1]]).any():

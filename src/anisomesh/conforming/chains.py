@@ -11,7 +11,7 @@ import numpy.typing as npt
 
 from anisomesh._arrays import Faces, Points
 
-_REACH = 0.7  # distances to the next vertices, up to which two vertices become one; heuristic
+_SAME_VERTEX_REACH = 0.7  # distances to the next vertices, up to which two vertices become one; heuristic
 
 Ints = npt.NDArray[np.int64]
 Floats = npt.NDArray[np.float64]
@@ -53,7 +53,7 @@ class Bundle:
 
 
 @dataclass(frozen=True, eq=False)
-class Conforming:
+class ConformedMesh:
     """A mesh whose chains have the same vertices.
 
     Attributes
@@ -69,7 +69,7 @@ class Conforming:
     chains: tuple[Ints, ...]
 
 
-def conform(points: Points, faces: Faces, bundles: Sequence[Bundle]) -> Conforming:
+def conform(points: Points, faces: Faces, bundles: Sequence[Bundle]) -> ConformedMesh:
     """Give the chains of each bundle the same vertices at the same places.
 
     Parameters
@@ -105,7 +105,7 @@ def conform(points: Points, faces: Faces, bundles: Sequence[Bundle]) -> Conformi
             splits += _splits(table[row], len(points))
         chains.append(table)
     everything = np.concatenate([points, *added])
-    return Conforming(everything, with_split_sides(faces, splits), tuple(chains))
+    return ConformedMesh(everything, with_split_sides(faces, splits), tuple(chains))
 
 
 def with_split_sides(faces: Faces, splits: list[tuple[int, int, Ints]]) -> Faces:
@@ -181,7 +181,7 @@ def _matched(wanted: Floats, places: Floats, length: float) -> dict[int, int]:
     low = np.searchsorted(wanted, places)
     pairs = [(k, j) for k in range(len(places)) for j in range(max(low[k] - 2, 0), min(low[k] + 2, len(wanted)))]
     for k, j in sorted(pairs, key=lambda pair: abs(float(places[pair[0]] - wanted[pair[1]]))):
-        if abs(places[k] - wanted[j]) > _REACH * gap[j]:
+        if abs(places[k] - wanted[j]) > _SAME_VERTEX_REACH * gap[j]:
             continue
         at = bisect_left(chosen, (k, j))
         after_before = at == 0 or (chosen[at - 1][0] < k and chosen[at - 1][1] < j)

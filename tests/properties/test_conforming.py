@@ -4,10 +4,10 @@ import numpy as np
 import pytest
 from junction_shapes import square
 
+from anisomesh.conforming.boundary_places import boundary_places
+from anisomesh.conforming.chains import Bundle, Chain, conform
 from anisomesh.mesh.surface import Surface
 from anisomesh.mesh.topology import boundary_loops, euler_characteristic
-from anisomesh.meshops.boundary_places import boundary_places
-from anisomesh.meshops.conform import Bundle, Chain, conform
 
 CURVE = np.stack([0.3 * np.sin(np.linspace(0, 2, 41)), np.linspace(0, 2, 41), np.zeros(41)], axis=1)
 START = np.concatenate([[0.0], np.cumsum(np.linalg.norm(np.diff(CURVE, axis=0), axis=1))])
