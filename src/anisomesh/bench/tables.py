@@ -78,7 +78,8 @@ def faults(row: RunRow) -> list[str]:
     """Return the faults of the result of a row in words."""
     validity = row["evaluation"]["validity"]
     names = ("nonmanifold_edges", "nonmanifold_vertices", "flat", "inverted")
-    found = [name for name in names if validity.get(name) and not validity.get(f"{name}_input")]
+    joined = validity.get("nonmanifold_edges_input")  # whose edges and vertices are the ones of the input
+    found = [name for name in names if validity.get(name) and not (joined and name.startswith("nonmanifold"))]
     if not validity["oriented"]:
         found.append("not oriented")
     if validity["euler"] != validity["euler_input"]:

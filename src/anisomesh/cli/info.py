@@ -104,8 +104,6 @@ def _text(facts: dict[str, Any]) -> str:
         rows.append(("prepared", size))
     if facts["junction_curves"]:
         curves = counted(facts["junction_curves"], "curve")
-        rows.append(
-            ("junctions", f"{curves} with more than two faces at each edge; sheets are joined there in the result")
-        )
+        rows.append(("junctions", f"{curves} with more than two faces at each edge; joined in the result"))
     rows += [("hint", hint) for hint in facts["hints"]]
     return f"{facts['file']}\n{table(rows)}"

@@ -22,7 +22,7 @@ def faults(validity: Validity) -> list[str]:
     defects = (
         ("duplicate triangle", validity.duplicate_faces),
         ("non-manifold edge", 0 if validity.nonmanifold_edges_input else validity.nonmanifold_edges),
-        ("non-manifold point", 0 if validity.nonmanifold_vertices_input else validity.nonmanifold_vertices),
+        ("non-manifold point", 0 if validity.nonmanifold_edges_input else validity.nonmanifold_vertices),
         ("flat triangle", validity.flat),
         ("inverted triangle", validity.inverted),
         ("intersecting pair", validity.new_intersections),

@@ -9,9 +9,10 @@ import numpy as np
 
 from anisomesh._arrays import EdgeMask, PointLabels
 from anisomesh.junctions.graph import JunctionGraph, graph_of
-from anisomesh.mesh.subdivision import split_edges
 from anisomesh.mesh.surface import Surface
 from anisomesh.mesh.topology import corner_fans, edge_keys, edges_of, side_pairs
+from anisomesh.meshops.change import apply_changes
+from anisomesh.meshops.split import edge_split
 from anisomesh.repair.prepare import Prepared
 from anisomesh.resolve import is_designed
 
@@ -100,7 +101,11 @@ def _cut(surface: Surface, junction: EdgeMask) -> tuple[int, PointLabels]:
 def _with_middles(surface: Surface, junction: EdgeMask, split: EdgeMask) -> tuple[Surface, EdgeMask]:
     """Return a surface with points in the middle of some junctions (E,), and which of its edges are junctions."""
     kept, ends = edge_keys(surface.edges[junction & ~split]), surface.edges[split]
-    result = split_edges(surface, split)
-    middle = result.edges[:, 1] - surface.n_points
-    halves = (middle >= 0) & (ends[np.maximum(middle, 0)] == result.edges[:, :1]).any(axis=1)
+    result = surface
+    for pair in ends:
+        edge = int(np.flatnonzero(edge_keys(result.edges) == edge_keys(pair[None]))[0])
+        middle = surface.points[pair].mean(axis=0)
+        result = Surface(*apply_changes(result, [edge_split(result, edge, middle)]))
+    added = result.edges[:, 1] - surface.n_points
+    halves = (added >= 0) & (ends[np.maximum(added, 0)] == result.edges[:, :1]).any(axis=1)
     return result, halves | np.isin(edge_keys(result.edges), kept)

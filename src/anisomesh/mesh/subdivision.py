@@ -103,11 +103,6 @@ def split_long_edges(surface: Surface, max_length: float, *, max_faces: int) -> 
     )
 
 
-def split_edges(surface: Surface, split: EdgeMask) -> Surface:
-    """Return a surface with each of some edges (E,) split at its midpoint; the new points come last, in their order."""
-    return _split(surface, np.broadcast_to(np.eye(3), (surface.n_faces, 3, 3)), split)[0]
-
-
 def edges_within(subdivision: Subdivision, parent: Surface, edges: EdgeMask) -> EdgeMask:
     """Return which edges (E',) of a subdivided surface are parts of these edges (E,) of its parent.
 

@@ -34,9 +34,8 @@ class Validity:
     closed
         Whether every edge has two faces.
     boundary_loops, components, euler
-        Number of boundary loops and of connected components, and Euler characteristic V - E + F.
-    boundary_loops_input, components_input, euler_input, nonmanifold_edges_input, nonmanifold_vertices_input
-        The corresponding numbers of the input; the last two are not zero if its sheets are joined at junctions.
+        Number of boundary loops and of connected components, and Euler characteristic V - E + F; names with ``_input`` are of the
+        input, whose sheets are joined at non-manifold edges.
     duplicate_faces
         Number of faces with the same three vertices as an earlier face.
     nonmanifold_edges, nonmanifold_vertices
@@ -64,7 +63,6 @@ class Validity:
     nonmanifold_edges: int
     nonmanifold_edges_input: int
     nonmanifold_vertices: int
-    nonmanifold_vertices_input: int
     oriented: bool
     flat: int
     inverted: int
@@ -84,10 +82,8 @@ def check_validity(result: Surface, reference: Surface, whole: Surface | None = 
     ----------
     result
         The remesh.
-    reference
-        Its prepared input, consistently oriented, in the same units.
-    whole
-        The prepared input with its sheets joined at junctions, whose topology counts; the reference itself by default.
+    reference, whole
+        Its prepared input, consistently oriented, in the same units, and the same with its sheets joined if it is cut.
     """
     closest, whole = ClosestPoints(reference), reference if whole is None else whole
     return Validity(
@@ -102,7 +98,6 @@ def check_validity(result: Surface, reference: Surface, whole: Surface | None = 
         nonmanifold_edges=count_nonmanifold_edges(result.faces),
         nonmanifold_edges_input=count_nonmanifold_edges(whole.faces),
         nonmanifold_vertices=count_nonmanifold_points(result.faces),
-        nonmanifold_vertices_input=count_nonmanifold_points(whole.faces),
         oriented=is_oriented(result.faces),
         flat=int(is_flat(result.points[result.faces]).sum()),
         inverted=int(inverted_faces(result, closest).sum()),
