@@ -34,8 +34,8 @@ class Validity:
     closed
         Whether every edge has two faces.
     boundary_loops, components, euler
-        Number of boundary loops and of connected components, and Euler characteristic V - E + F; names with ``_input`` are of the
-        input, whose sheets are joined at non-manifold edges.
+        Number of boundary loops and of connected components, and Euler characteristic V - E + F; ``..._input`` are
+        numbers of the input, its sheets joined at non-manifold edges.
     duplicate_faces
         Number of faces with the same three vertices as an earlier face.
     nonmanifold_edges, nonmanifold_vertices
