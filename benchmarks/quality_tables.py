@@ -23,7 +23,12 @@ def faults(row: dict[str, Any]) -> list[str]:
     validity = row["validity"]
     found = [] if validity["oriented"] else ["not oriented"]
     names = ("nonmanifold_edges", "nonmanifold_vertices", "inverted", "new_intersections")
-    found += [f"{name} {validity[name]}" for name in names if validity[name]]
+    joined = validity.get("nonmanifold_edges_input")
+    found += [
+        f"{name} {validity[name]}"
+        for name in names
+        if validity[name] and not (joined and name.startswith("nonmanifold"))
+    ]
     found += [
         f"{name} {validity[name]} for {validity[f'{name}_input']}"
         for name in ("euler", "components", "boundary_loops")

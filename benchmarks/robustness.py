@@ -59,7 +59,12 @@ def faults(row: dict[str, Any]) -> list[str]:
     validity = row["validity"]
     pairs = [(name, validity[name], validity[f"{name}_input"]) for name in KEPT]
     found = [f"{name} {value} for {wanted}" for name, value, wanted in pairs if value != wanted]
-    found += [f"{name} {validity[name]}" for name in FAULTS if validity[name]]
+    joined = validity.get("nonmanifold_edges_input")
+    found += [
+        f"{name} {validity[name]}"
+        for name in FAULTS
+        if validity[name] and not (joined and name.startswith("nonmanifold"))
+    ]
     return found if validity["oriented"] else [*found, "not oriented"]
 
 

@@ -26,9 +26,12 @@ _OFF_SHARE = 0.05  # of a mesh on which lengths may be off without a remark
 COUNT_TOLERANCE = 0.02  # share of the vertices asked for by which a result may differ without a remark
 
 
-def losses_of_repair(report: PrepareReport) -> Iterator[str]:
-    """Yield one sentence for everything that the repair of the input has taken apart."""
-    if report.edges_nonmanifold_cut:
+def losses_of_repair(report: PrepareReport, *, joined: bool) -> Iterator[str]:
+    """Yield one sentence for everything that the repair of the input has taken apart.
+
+    ``joined`` if sheets are joined again.
+    """
+    if report.edges_nonmanifold_cut and not joined:
         count = report.edges_nonmanifold_cut
         yield f"the sheets that meet at {count:,} edges with more than two faces are separate in the result"
     if report.edges_nonorientable_cut:

@@ -36,6 +36,7 @@ from anisomesh.fitting.target import FitTarget
 from anisomesh.fitting.valid import fit_without_faults
 from anisomesh.io.describe import soundness
 from anisomesh.io.meshes import mesh_of
+from anisomesh.junctions.join import JoinTask, sites_for
 from anisomesh.mesh.surface import Surface
 from anisomesh.mesh.validity import Validity, check_validity
 from anisomesh.metric.conformity import Conformity, MetricExtent, conformity
@@ -119,21 +120,21 @@ def remesh(
         given = mesh_of(mesh, faces)
     with run.stage("prepare"):
         source = prepared_input(given, options)
-    prepared = source.prepared.surface
+    prepared, remeshed = source.whole, partial(_joined_or_apart, given, source)
     if max_error is not None:
         options = replace(options, denoise=False)  # the distance asked for refers to the input itself
 
         def with_vertices(n: int) -> RemeshResult:
             run.on_step(StepInfo(stage="search", message=f"{n:,} vertices"))
-            return _remesh(source, n, options, run, nearest=True)
+            return remeshed(n, options, run, nearest=True)
 
         result = smallest_within(with_vertices, prepared, max_error, deadline)
     elif n_vertices is None and ratio is None:
         n = count_for_length(source, options, run)
-        result = _remesh(source, n, options, run, asked=options.absolute_length)
+        result = remeshed(n, options, run, asked=options.absolute_length)
     else:
         n = n_vertices or max(MIN_VERTICES, round((ratio or 0.0) * prepared.n_points))
-        result = _remesh(source, n, options, run)
+        result = remeshed(n, options, run)
     if n_vertices is None and ratio is None:
         result = replace(result, warnings=(*lengths_beyond(prepared, options, max_error), *result.warnings))
     return _with_attributes(result, given, options, run) if options.attributes else result
@@ -151,6 +152,21 @@ def _with_attributes(result: RemeshResult, given: Mesh, options: RemeshOptions, 
     return replace(result, mesh=mesh, seconds=run.total_seconds(), warnings=warnings)
 
 
+def _joined_or_apart(
+    given: Mesh, source: PreparedInput, n: int, options: RemeshOptions, run: Run, **how: Any
+) -> RemeshResult:
+    """Remesh a prepared surface with n vertices, its sheets joined at junctions; apart if that does not succeed."""
+    result = _remesh(source, n, options, run, **how)
+    if result is None:
+        logger.info("the sheets cannot be joined with %d vertices, and are remeshed apart", n)
+        with run.stage("prepare"):
+            source = prepared_input(given, options, joined=False)
+        result = _remesh(source, n, options, run, **how)
+    if result is None:
+        raise AssertionError("a mesh without junctions was not joined")
+    return result
+
+
 def _remesh(
     source: PreparedInput,
     n: int,
@@ -159,25 +175,30 @@ def _remesh(
     *,
     nearest: bool = False,
     asked: float | None = None,
-) -> RemeshResult:
-    """Remesh a prepared surface with n vertices.
+) -> RemeshResult | None:
+    """Remesh a prepared surface with n vertices; None if sheets cannot be joined.
 
     ``nearest`` if the distance counts more than the shape, and ``asked`` is the length of edges in the metric if that
     was asked for.
     """
-    prepared, tasks = source.prepared, set_up(source, n, options, run, nearest=nearest)
+    prepared, junctions = source.prepared, source.junctions
+    n_sites = n if junctions is None else sites_for(junctions, n)
+    tasks = set_up(source, n_sites, options, run, nearest=nearest)
     measured, task = tasks.measured, tasks.dual
     frame, field = measured.frame, measured.field
     run.check_time()
     order = task.voronoi.embedded.face_order
-    made = _valid_mesh(task, tasks.fit, measured.options, run)
+    join = None if junctions is None else JoinTask(task, junctions, frame, n)
+    made = _valid_mesh(_MeshTask(task, tasks.fit, join), measured.options, run)
+    if made is None:
+        return None
     mesh, optimised, validity = made.mesh, made.optimised, made.validity
     agreement = _agreement(mesh, tasks, asked) if asked or task.error_weights is not None else None
     surface = Surface(frame.to_model(mesh.points), mesh.faces)
     return RemeshResult(
         surface=surface,
         mesh=Mesh(surface=surface),
-        prepared=prepared.surface,
+        prepared=source.whole,
         prepare_report=prepared.report,
         working=task.voronoi.embedded.surface,
         tensors=field.tensors,
@@ -197,7 +218,7 @@ def _remesh(
         validity=validity,
         seconds=run.total_seconds(),
         warnings=(
-            *losses_of_repair(prepared.report),
+            *losses_of_repair(prepared.report, joined=junctions is not None),
             *measured.remarks,
             *field.remarks,
             *losses_of_shape(
@@ -232,6 +253,15 @@ def _agreement(mesh: ValidMesh, tasks: Tasks, asked: float | None) -> Conformity
     )
 
 
+@dataclass(frozen=True, eq=False)
+class _MeshTask:
+    """How a mesh is made from sites, what it is fitted to, and how its sheets are joined; None if that is not done."""
+
+    dual: MeshingTask
+    fit: FitTarget | None
+    join: JoinTask | None
+
+
 @dataclass(frozen=True, kw_only=True, eq=False)
 class _Made:
     """A mesh, its distance from prescribed edges, the sites it was made from, and the seed of their start."""
@@ -248,22 +278,27 @@ class _Made:
         return self.validity.inverted + self.validity.new_intersections + self.validity.flat
 
 
-def _valid_mesh(task: MeshingTask, target: FitTarget | None, options: RemeshOptions, run: Run) -> _Made:
-    """Return the mesh of a task; from the next seeds while it has faults that the input does not explain."""
-    best = made = _mesh_of_start(task, target, options, run)
+def _valid_mesh(task: _MeshTask, options: RemeshOptions, run: Run) -> _Made | None:
+    """Return the mesh of a task; from the next seeds while it has faults that the input does not explain.
+
+    None if its sheets cannot be joined.
+    """
+    best = made = _mesh_of_start(task, options, run)
     for seed in range(options.seed + 1, options.seed + MAX_STARTS):
-        explained = made.validity.self_intersections_input > 0 or made.mesh.from_input
-        if not best.faults or explained or run.deadline.passed():
+        if best is None or made is None or not best.faults or run.deadline.passed():
             break
-        fresh = RestrictedVoronoi(task.voronoi.embedded, threads=options.threads)
-        made = _mesh_of_start(replace(task, voronoi=fresh), target, replace(options, seed=seed), run)
-        if made.faults < best.faults:
+        if made.validity.self_intersections_input > 0 or made.mesh.from_input:
+            break
+        fresh = replace(task.dual, voronoi=RestrictedVoronoi(task.dual.voronoi.embedded, threads=options.threads))
+        made = _mesh_of_start(replace(task, dual=fresh), replace(options, seed=seed), run)
+        if made is not None and made.faults < best.faults:
             best = made
     return best
 
 
-def _mesh_of_start(task: MeshingTask, target: FitTarget | None, options: RemeshOptions, run: Run) -> _Made:
-    """Return the mesh of a task from the sites that start from the seed of the options, fitted to the target."""
+def _mesh_of_start(start: _MeshTask, options: RemeshOptions, run: Run) -> _Made | None:
+    """Return the mesh of a task from the sites that start from the seed of the options; None if it cannot be joined."""
+    task, target, join = start.dual, start.fit, start.join
     with run.stage("cvt"):
         optimised = optimise_sites(
             task.voronoi,
@@ -276,6 +311,11 @@ def _mesh_of_start(task: MeshingTask, target: FitTarget | None, options: RemeshO
         )
     with run.stage("dual"):
         mesh = mesh_from_sites(task, optimised.sites)
+        conforming = None if join is None else join.conforming(mesh)
+        if conforming is not None:
+            mesh = conforming.mesh
+        elif join is not None:
+            return None
     with run.stage("fit"):
         surface = Surface(mesh.points, mesh.faces)
         feature_distance = distance_to_crease_edges(
@@ -284,7 +324,12 @@ def _mesh_of_start(task: MeshingTask, target: FitTarget | None, options: RemeshO
         if target is not None:
             surface = fit_without_faults(surface, target, crease_edges=mesh.crease_edges, deadline=run.deadline)
             mesh = replace(mesh, points=surface.points, faces=surface.faces, crease_edges=mesh.crease_edges[:0])
-        validity = check_validity(surface, task.surface)
+        if conforming is not None and join is not None:
+            joined = join.joined(conforming.after(surface))
+            if joined is None:
+                return None
+            mesh, surface = replace(mesh, points=joined.points, faces=joined.faces), joined
+        validity = check_validity(surface, task.surface, None if join is None else join.junctions.whole)
     facts = options.seed, optimised.iterations, optimised.status, soundness(validity)
     logger.info("seed %d: %d iterations, %s; mesh: %s", *facts)
     return _Made(

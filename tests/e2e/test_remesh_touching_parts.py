@@ -1,4 +1,4 @@
-"""Parts that touch: sheets that the repair has cut apart keep their creases, and the result says so."""
+"""Parts that touch keep their creases, and surfaces with one side say that they were cut."""
 
 import numpy as np
 import pytest
@@ -25,10 +25,9 @@ def test_cubes_with_a_common_edge_or_corner_are_exact(shift, n):
     cubes = two_boxes(shift, n)
     result = anisomesh.remesh(cubes, n_vertices=150, embedding="direct")
     assert surface_distance(cubes, result.surface, samples=20_000).hausdorff < 1e-6
-    assert result.validity.components == 2
+    assert result.validity.components == (1 if shift == (1, 1, 0) else 2)
     assert result.surface.n_points == 150
-    said = [warning for warning in result.warnings if "separate in the result" in warning]
-    assert len(said) == (shift == (1, 1, 0)), result.warnings
+    assert not result.warnings
 
 
 def test_intersections_away_from_a_common_edge_are_found():

@@ -76,7 +76,7 @@ def test_trimesh_and_back(caplog):
     assert read.regions == {}
     without_seams = replace(mesh, corner_data={}, regions={"node": FULL.regions["physical"]})
     scene = to_trimesh(without_seams)
-    assert set(scene.geometry) == {"inlet", "Wände", "geometry_2"}
+    assert set(scene.geometry) == {"inlet", "Wände", "region_3"}
     np.testing.assert_array_equal(
         np.concatenate([part.face_attributes["pressure"] for part in scene.geometry.values()]),
         mesh.face_data["pressure"],

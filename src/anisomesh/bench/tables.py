@@ -77,7 +77,9 @@ _LEGEND = (
 def faults(row: RunRow) -> list[str]:
     """Return the faults of the result of a row in words."""
     validity = row["evaluation"]["validity"]
-    found = [name for name in ("nonmanifold_edges", "nonmanifold_vertices", "flat", "inverted") if validity.get(name)]
+    names = ("nonmanifold_edges", "nonmanifold_vertices", "flat", "inverted")
+    joined = validity.get("nonmanifold_edges_input")  # whose edges and vertices are the ones of the input
+    found = [name for name in names if validity.get(name) and not (joined and name.startswith("nonmanifold"))]
     if not validity["oriented"]:
         found.append("not oriented")
     if validity["euler"] != validity["euler_input"]:

@@ -37,10 +37,12 @@ def describe(surface: Surface) -> dict[str, Any]:
     The genus is the sum over the components, with every boundary loop closed by a disk. It is None unless the surface
     is an oriented manifold.
     """
+    from anisomesh.junctions.cut import cut_at_junctions
     from anisomesh.repair.prepare import prepare
 
     validity = _validity(surface)
     prepared = prepare(surface)
+    junctions = cut_at_junctions(prepared)
     low, high = surface.points.min(axis=0), surface.points.max(axis=0)
     lengths = surface.edge_lengths
     return {
@@ -57,6 +59,7 @@ def describe(surface: Surface) -> dict[str, Any]:
             "points": prepared.surface.n_points,
             "faces": prepared.surface.n_faces,
         },
+        "junction_curves": 0 if junctions is None else len(junctions.graph.curves),
         "hints": hints(prepared.surface),
     }
 
@@ -103,5 +106,8 @@ def _text(facts: dict[str, Any]) -> str:
     if prepare["changes"]:
         size = f"{counted(prepare['points'], 'point')}, {counted(prepare['faces'], 'face')}"
         rows.append(("prepared", size))
+    if facts["junction_curves"]:
+        curves = counted(facts["junction_curves"], "curve")
+        rows.append(("junctions", f"{curves} with more than two faces at each edge; joined in the result"))
     rows += [("hint", hint) for hint in facts["hints"]]
     return f"{facts['file']}\n{table(rows)}"

@@ -110,13 +110,14 @@ def describe_lengths(conformity: dict[str, Any]) -> str:
 def describe_validity(validity: dict[str, Any]) -> str:
     """Return the validity of a surface in words: boundary, components, topology, defects."""
     edges, vertices = validity["nonmanifold_edges"], validity["nonmanifold_vertices"]
+    of_input = f" (input {validity['nonmanifold_edges_input']:,})" if validity.get("nonmanifold_edges_input") else ""
     euler_input = validity.get("euler_input", validity["euler"])
     parts = [
         "closed" if validity["closed"] else counted(validity["boundary_loops"], "boundary loop"),
         counted(validity["components"], "component"),
         f"Euler {validity['euler']}" + (f" (input {euler_input})" if euler_input != validity["euler"] else ""),
         "manifold" if not edges and not vertices else "",
-        counted(edges, "non-manifold edge") if edges else "",
+        counted(edges, "non-manifold edge") + of_input if edges else "",
         counted(vertices, "non-manifold vertex", "non-manifold vertices") if vertices else "",
         "" if validity["oriented"] else "not consistently oriented",
         counted(validity["flat"], "flat triangle") if validity.get("flat") else "",

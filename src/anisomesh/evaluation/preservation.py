@@ -55,7 +55,8 @@ def feature_preservation(
         The surface and its remesh, in the same units.
     crease_angle
         Angle in degrees between the normals of two faces above which their edge is a crease of the reference. Half
-        this angle makes a crease of the remesh, as a chord of a curved crease is less sharp than the crease.
+        this angle makes a crease of the remesh, as a chord of a curved crease is less sharp than the crease; edges of
+        the remesh with more than two faces are creases too.
     tolerance
         Largest distance, in units of the surfaces, at which a crease or corner counts as preserved.
 
@@ -94,7 +95,8 @@ def _covered(
     if not sharp.any():
         return 1.0
     spacing = max(tolerance / _SAMPLES_PER_TOLERANCE, float(reference.edge_lengths[sharp].sum()) / _MAX_CREASE_SAMPLES)
-    found = points_along(result, sharp_edges(result, angle), spacing)
+    creases = sharp_edges(result, angle) | (result.edge_face_count > 2)
+    found = points_along(result, creases, spacing)
     if len(found) == 0:
         return 0.0
     # midpoint rule: every sharp edge in equal pieces, each tested at its midpoint and weighted by its length

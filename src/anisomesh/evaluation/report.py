@@ -15,6 +15,7 @@ from anisomesh.evaluation.sampled import CREASE_ANGLE, DEFAULT_SAMPLES, SampledM
 from anisomesh.evaluation.shape import ShapeStatistics, quality_in_reference_metric, shape_statistics
 from anisomesh.io.describe import html_table, soundness
 from anisomesh.io.meshes import mesh_of
+from anisomesh.junctions.cut import cut_at_junctions
 from anisomesh.mesh.closest_points import ClosestPoints
 from anisomesh.mesh.distance import SurfaceDistance, surface_distance
 from anisomesh.mesh.geometry import unit_frame
@@ -108,7 +109,8 @@ def evaluate(
     ----------
     reference
         The input surface: the name of a file, or what :func:`~anisomesh.io.convert.as_surface` takes. It is repaired as
-        before a remesh, so that it has an orientation and a topology for comparison.
+        before a remesh, so that it has an orientation and a topology for comparison; non-manifold edges count as what
+        they are in its topology and boundary.
     result
         The remesh, of the same types and in the same coordinates; it is measured without repair.
     samples
@@ -134,11 +136,14 @@ def evaluate(
     samples, seed = whole_number("samples", samples, 1), whole_number("seed", seed, 0)
     if not 0.0 <= real_number("crease_angle", crease_angle) <= 180.0:
         raise OptionError(f"crease_angle = {crease_angle}; expected 0 to 180 degrees")
-    repaired = prepare(mesh_of(reference).surface).surface
+    prepared = prepare(mesh_of(reference).surface)
+    repaired, junctions = prepared.surface, cut_at_junctions(prepared)
     frame = unit_frame(repaired.points)
     a = repaired.with_points(frame.to_unit(repaired.points))
     remeshed = mesh_of(result).surface
     b = Surface(frame.to_unit(remeshed.points), remeshed.faces)
+    joined = repaired if junctions is None else junctions.whole
+    whole = joined.with_points(frame.to_unit(joined.points))
     closest = ClosestPoints(a)
     squared = closest.squared_distances(b.points[np.unique(b.faces)])
     rng = np.random.default_rng(seed)
@@ -152,6 +157,6 @@ def evaluate(
         vertex_max=float(np.sqrt(squared.max())),
         shape=shape_statistics(b, quality_in_reference_metric(a, b)),
         features=feature_preservation(a, b, crease_angle=crease_angle),
-        boundary=boundary_distance(a, b),
-        validity=check_validity(b, a),
+        boundary=boundary_distance(whole, b),
+        validity=check_validity(b, a, whole),
     )

@@ -41,7 +41,7 @@ class BoundaryLoops(FeaturePolylines):
             Arc length over which turns are measured. Of several corners within it only the sharpest is kept, unless
             the others are as sharp when measured over an eighth of it.
         sharp_ends
-            Points of the surface where a crease meets the boundary: always corners.
+            Points of the surface where a crease meets the boundary, or a vertex is wanted: always corners.
         """
         turn, fine = self.turns(reach), self.turns(_FINE_SCALE * reach)
         turn[np.isin(self.tail, sharp_ends)] = 180.0

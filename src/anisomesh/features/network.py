@@ -105,11 +105,11 @@ def trace_features(
         if np.shape(mask) != (len(surface.edges),) or mask.dtype != bool:
             raise OptionError(f"{name} is not a mask ({len(surface.edges)},) of the edges of the embedded surface")
     boundary = trace_boundary(positions, surface)
-    crease_ends = np.unique(surface.edges[sharp]).astype(np.int64)
-    corners, turns = boundary.corners(_CORNER_SCALE * spacing, crease_ends)
+    if apexes is None:
+        apexes = np.zeros(0, dtype=np.int64)
+    always = np.union1d(surface.edges[sharp], apexes).astype(np.int64)
+    corners, turns = boundary.corners(_CORNER_SCALE * spacing, always)
     creases = select_creases(
         positions, surface, sharp, required=required, spacing=spacing, max_length=_MAX_CREASE_LENGTH * n_sites
     )
-    if apexes is None:
-        apexes = np.zeros(0, dtype=np.int64)
     return FeatureNetwork(boundary, corners, turns, creases, spacing, sharp, required, apexes)

@@ -11,8 +11,8 @@ from anisomesh.mesh.validity import Validity
 def faults(validity: Validity) -> list[str]:
     """Return what is wrong with a remesh, such as ``"3 inverted triangles"``; nothing if it is valid.
 
-    Its topology is wrong where it differs from the topology of the input. Intersections that the input has too are not
-    counted.
+    Its topology is wrong where it differs from the topology of the input; non-manifold edges and points are wrong where
+    the input has none. Intersections that the input has too are not counted.
     """
     topology = (
         ("boundary loops", validity.boundary_loops, validity.boundary_loops_input),
@@ -21,8 +21,8 @@ def faults(validity: Validity) -> list[str]:
     )
     defects = (
         ("duplicate triangle", validity.duplicate_faces),
-        ("non-manifold edge", validity.nonmanifold_edges),
-        ("non-manifold point", validity.nonmanifold_vertices),
+        ("non-manifold edge", 0 if validity.nonmanifold_edges_input else validity.nonmanifold_edges),
+        ("non-manifold point", 0 if validity.nonmanifold_edges_input else validity.nonmanifold_vertices),
         ("flat triangle", validity.flat),
         ("inverted triangle", validity.inverted),
         ("intersecting pair", validity.new_intersections),

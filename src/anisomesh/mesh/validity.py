@@ -34,9 +34,8 @@ class Validity:
     closed
         Whether every edge has two faces.
     boundary_loops, components, euler
-        Number of boundary loops and of connected components, and Euler characteristic V - E + F.
-    boundary_loops_input, components_input, euler_input
-        The corresponding numbers of the input.
+        Number of boundary loops and of connected components, and Euler characteristic V - E + F; ``..._input`` are
+        numbers of the input, its sheets joined at non-manifold edges.
     duplicate_faces
         Number of faces with the same three vertices as an earlier face.
     nonmanifold_edges, nonmanifold_vertices
@@ -62,6 +61,7 @@ class Validity:
     euler_input: int
     duplicate_faces: int
     nonmanifold_edges: int
+    nonmanifold_edges_input: int
     nonmanifold_vertices: int
     oriented: bool
     flat: int
@@ -75,27 +75,28 @@ class Validity:
         return asdict(self)
 
 
-def check_validity(result: Surface, reference: Surface) -> Validity:
+def check_validity(result: Surface, reference: Surface, whole: Surface | None = None) -> Validity:
     """Compare the topology of a remesh with its input's and count its defects.
 
     Parameters
     ----------
     result
         The remesh.
-    reference
-        Its prepared input, consistently oriented, in the same units.
+    reference, whole
+        Its prepared input, consistently oriented, in the same units, and the same with its sheets joined if it is cut.
     """
-    closest = ClosestPoints(reference)
+    closest, whole = ClosestPoints(reference), reference if whole is None else whole
     return Validity(
         closed=bool((result.edge_face_count == 2).all()),
         boundary_loops=len(boundary_loops(result.faces)),
-        boundary_loops_input=len(boundary_loops(reference.faces)),
+        boundary_loops_input=len(boundary_loops(whole.faces)),
         components=connected_components(result.faces, result.n_points)[0],
-        components_input=connected_components(reference.faces, reference.n_points)[0],
+        components_input=connected_components(whole.faces, whole.n_points)[0],
         euler=euler_characteristic(result.faces),
-        euler_input=euler_characteristic(reference.faces),
+        euler_input=euler_characteristic(whole.faces),
         duplicate_faces=result.n_faces - len(np.unique(np.sort(result.faces, axis=1), axis=0)),
         nonmanifold_edges=count_nonmanifold_edges(result.faces),
+        nonmanifold_edges_input=count_nonmanifold_edges(whole.faces),
         nonmanifold_vertices=count_nonmanifold_points(result.faces),
         oriented=is_oriented(result.faces),
         flat=int(is_flat(result.points[result.faces]).sum()),

@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 import logging
-from dataclasses import dataclass, fields
+from dataclasses import dataclass, field, fields
 from typing import Literal
 
 import numpy as np
+import numpy.typing as npt
 
-from anisomesh._arrays import Faces, Indices, PointLabels
+from anisomesh._arrays import EdgeMask, Faces, Indices, PointLabels
 from anisomesh.errors import MeshError, OptionError
 from anisomesh.mesh import geometry, topology
 from anisomesh.mesh.surface import Surface
@@ -77,7 +78,7 @@ class PrepareReport:
     @property
     def changed(self) -> bool:
         """Whether anything was changed."""
-        return any(getattr(self, field.name) for field in fields(self) if field.name != "components")
+        return any(getattr(self, each.name) for each in fields(self) if each.name != "components")
 
     def lines(self) -> list[str]:
         """Return a line of text for each kind of change that was made."""
@@ -98,11 +99,14 @@ class Prepared:
     point_source
         For every point (V,) an input point at the same position, up to the weld tolerance and the length below which
         sides of faces are collapsed (about 1e-14 of the longest side).
+    junctions
+        Which of its edges (E,) are parts of non-manifold edges that were cut apart.
     """
 
     surface: Surface
     report: PrepareReport
     point_source: PointLabels
+    junctions: EdgeMask
 
 
 def prepare(surface: Surface, *, weld_tolerance: float | Literal["auto"] = 0.0) -> Prepared:
@@ -161,12 +165,13 @@ def prepare(surface: Surface, *, weld_tolerance: float | Literal["auto"] = 0.0) 
     )
     for line in report.lines():
         logger.info("prepare: %s", line)
-    return Prepared(surface=result, report=report, point_source=source)
+    cut = np.concatenate([each.cut for each in passes])
+    return Prepared(surface=result, report=report, point_source=source, junctions=_edges_at(result, cut))
 
 
 @dataclass(frozen=True, kw_only=True)
 class _RepairPass:
-    """The result of one pass, and the input point of each of its points."""
+    """The result of one pass, the input point of each of its points, and where edges were cut apart (n, 2, 3)."""
 
     surface: Surface
     source: PointLabels
@@ -177,6 +182,7 @@ class _RepairPass:
     n_split: int = 0
     n_nonmanifold_edges: int = 0
     n_conflicts: int = 0
+    cut: npt.NDArray[np.float64] = field(default_factory=lambda: np.zeros((0, 2, 3)))
 
 
 def _repair_once(surface: Surface, tolerance: float) -> _RepairPass:
@@ -199,6 +205,7 @@ def _repair_once(surface: Surface, tolerance: float) -> _RepairPass:
     pairs = orientation.renumber_sides(pairs[~found.conflict], found.flip)
     nonmanifold = orientation.renumber_sides(nonmanifold, found.flip)
     welded = labels[faces]
+    cut = surface.points[topology.half_edges(welded)[nonmanifold]]
     pairs = np.concatenate([pairs, orientation.pair_nonmanifold_sides(surface.points, welded, nonmanifold)])
     source, new_faces = _order_points(faces, *orientation.split_points(welded, pairs))
     points = surface.points[labels[source]]
@@ -213,7 +220,18 @@ def _repair_once(surface: Surface, tolerance: float) -> _RepairPass:
         n_flipped=int(found.flip.sum()),
         n_nonmanifold_edges=len(np.unique(topology.edges_of(welded)[1].ravel()[nonmanifold])),
         n_conflicts=int(found.conflict.sum()),
+        cut=cut,
     )
+
+
+def _edges_at(surface: Surface, places: npt.NDArray[np.float64]) -> EdgeMask:
+    """Return which edges (E,) of a surface have both their ends at the ends of one of some edges (n, 2, 3)."""
+    if len(places) == 0:
+        return np.zeros(len(surface.edges), dtype=bool)
+    everywhere = np.concatenate([surface.points, places.reshape(-1, 3)])
+    place = np.unique(everywhere, axis=0, return_inverse=True)[1].reshape(-1)
+    wanted = topology.edge_keys(place[surface.n_points :].reshape(-1, 2))
+    return np.isin(topology.edge_keys(place[surface.edges]), wanted)
 
 
 def _check_range(surface: Surface) -> None:

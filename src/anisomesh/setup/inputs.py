@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -15,6 +15,7 @@ from anisomesh.attributes.model import Mesh
 from anisomesh.errors import MetricError, OptionError
 from anisomesh.features.detect import sharp_edges
 from anisomesh.features.tagged import tagged_edges, tagged_points
+from anisomesh.junctions.cut import Junctions, cut_at_junctions
 from anisomesh.mesh.geometry import even_edge_length
 from anisomesh.mesh.surface import Surface
 from anisomesh.metric.sizes import checked_sizes
@@ -44,7 +45,9 @@ class PreparedInput:
     Attributes
     ----------
     prepared
-        The prepared surface.
+        The prepared surface, or its sheets if these are to be joined.
+    junctions
+        Where sheets are to be joined, None if nowhere.
     tensors, density
         Metric (V, 3, 3) and density (V,) at its points, None if they are not prescribed.
     sizes
@@ -59,6 +62,7 @@ class PreparedInput:
     """
 
     prepared: Prepared
+    junctions: Junctions | None
     tensors: PointTensors | None
     density: PointScalars | None
     sizes: PointScalars | None
@@ -66,6 +70,11 @@ class PreparedInput:
     borders: EdgeMask
     seams: EdgeMask
     fixed: PointMask
+
+    @property
+    def whole(self) -> Surface:
+        """The prepared surface, its sheets joined."""
+        return self.prepared.surface if self.junctions is None else self.junctions.whole
 
     def features_at(self, n_vertices: int, surface: Surface) -> Followed:
         """Return the edges to follow with a number of vertices.
@@ -90,8 +99,15 @@ class PreparedInput:
         return Followed(followed, " and ".join(kinds), tuple(remarks))
 
 
-def prepared_input(mesh: Mesh, options: RemeshOptions) -> PreparedInput:
+def prepared_input(mesh: Mesh, options: RemeshOptions, *, joined: bool = True) -> PreparedInput:
     """Return the prepared surface of a mesh, and what the mesh and the options say of its points and edges.
+
+    Parameters
+    ----------
+    mesh, options
+        The mesh and the options.
+    joined
+        Whether sheets that meet at non-manifold edges are to be joined in the result.
 
     Raises
     ------
@@ -104,6 +120,11 @@ def prepared_input(mesh: Mesh, options: RemeshOptions) -> PreparedInput:
     """
     surface = mesh.surface
     prepared = prepare(surface, weld_tolerance=options.weld_tolerance)
+    junctions = cut_at_junctions(prepared) if joined else None
+    if junctions is not None:
+        sheets, source = junctions.sheets, prepared.point_source[junctions.source]
+        none = np.zeros(len(sheets.edges), dtype=bool)
+        prepared = replace(prepared, surface=sheets, point_source=source, junctions=none)
     tensors = density = None
     if options.has_tensors:
         given = _at_prepared("metric", options.metric, (surface.n_points, 3, 3), prepared, MetricError)
@@ -122,15 +143,21 @@ def prepared_input(mesh: Mesh, options: RemeshOptions) -> PreparedInput:
         sizes = checked_sizes(given, prepared.surface.points, prepared.point_source)
     prescribed = [mesh.features, *([] if options.features is None else [options.features])]
     borders, seams = _borders(with_split_sides(mesh, prepared.report, options), prepared.surface, options)
+    tagged = _tagged(prescribed, surface, prepared.surface, options)
+    fixed = tagged_points(surface, mesh.fixed_points, prepared.surface, options.weld_tolerance)
+    if junctions is not None:  # which are boundaries, and followed as such
+        inside = prepared.surface.edge_face_count == 2
+        tagged, borders, seams, fixed = tagged & inside, borders & inside, seams & inside, fixed | junctions.graph.nodes
     return PreparedInput(
         prepared=prepared,
+        junctions=junctions,
         tensors=tensors,
         density=density,
         sizes=sizes,
-        tagged=_tagged(prescribed, surface, prepared.surface, options),
+        tagged=tagged,
         borders=borders,
         seams=seams,
-        fixed=tagged_points(surface, mesh.fixed_points, prepared.surface, options.weld_tolerance),
+        fixed=fixed,
     )
 
 

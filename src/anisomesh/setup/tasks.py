@@ -84,6 +84,8 @@ def set_up(source: PreparedInput, n: int, options: RemeshOptions, run: Run, *, n
             error_weights=weights,
         )
         plan = fit_plan(options, surface, nearest=nearest)
+        if plan is not None and source.junctions is not None:  # a decimation of sheets would not fit together
+            plan = replace(plan, decimation=None)
         sizing = PlacedMetric(ClosestPoints(working), asked)
         metric = replace(sizing, field=field) if weights is None else sizing
         prescribed = bool(source.tagged.any())

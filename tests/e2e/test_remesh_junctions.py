@@ -1,0 +1,86 @@
+"""Non-manifold junctions: the sheets of the result meet as the sheets of the input do."""
+
+import numpy as np
+import pytest
+from junction_shapes import SHAPES, lengths_by_count
+
+import anisomesh
+from anisomesh.attributes.model import Mesh, Regions
+from anisomesh.junctions import join
+from anisomesh.mesh.distance import surface_distance
+from anisomesh.mesh.surface import Surface
+from anisomesh.mesh.topology import connected_components, euler_characteristic
+
+QUICK = [("wavy_fin", 0.3), ("two_boxes", 0.6), ("cubes_at_an_edge", 10.0), ("soap_films", 0.3)]
+CASES = [(name, ratio * (30.0 if name == "cubes_at_an_edge" else 1.0)) for name in SHAPES for ratio in (0.15, 0.3, 0.8)]
+
+
+def check_joined(surface, result, n):
+    """Assert that the sheets of a result meet as in the surface, that it has n vertices, and is valid."""
+    made, validity = result.surface, result.validity
+    before, after = (lengths_by_count(each.points, each.faces) for each in (surface, made))
+    assert not result.warnings
+    assert made.n_points == n
+    assert before.keys() == after.keys()
+    for count, length in before.items():  # a chord is shorter than its curve
+        assert 0.97 * length < after[count] < 1.001 * length, count
+    assert euler_characteristic(made.faces) == euler_characteristic(surface.faces)
+    assert connected_components(made.faces, n)[0] == connected_components(surface.faces, surface.n_points)[0]
+    assert validity.inverted == validity.flat == validity.new_intersections == validity.duplicate_faces == 0
+    assert validity.oriented
+    assert validity.nonmanifold_edges > 0
+    assert validity.nonmanifold_edges_input > 0
+    assert "valid" in repr(result)
+
+
+@pytest.mark.parametrize(
+    ("name", "ratio"), [*QUICK, *(pytest.param(*case, marks=pytest.mark.slow) for case in CASES if case not in QUICK)]
+)
+def test_sheets_meet_as_in_the_input(name, ratio):
+    surface = Surface(*SHAPES[name]())
+    n = max(round(ratio * surface.n_points), 30)
+    result = anisomesh.remesh(surface, n_vertices=n, threads=1)
+    check_joined(surface, result, n)
+    assert surface_distance(surface, result.surface, samples=5_000).hausdorff < 0.05
+
+
+def test_ratio_counts_joined_vertices():
+    surface = Surface(*SHAPES["book"]())
+    result = anisomesh.remesh(surface, ratio=0.4, embedding="direct", threads=1)
+    assert result.surface.n_points == round(0.4 * surface.n_points)
+    assert result.prepared.n_points == surface.n_points
+
+
+def test_shape_and_parts_of_a_joined_mesh_are_measured_against_the_input():
+    surface = Surface(*SHAPES["cubes_at_an_edge"]())
+    result = anisomesh.remesh(surface, n_vertices=100, embedding="direct", threads=1)
+    measured = anisomesh.evaluate(surface, result.surface, samples=2_000)
+    assert measured.features.crease_covered == 1.0
+    assert measured.features.corners_kept == measured.features.corners
+    assert measured.validity.components == measured.validity.components_input == 1
+    assert measured.validity.euler == measured.validity.euler_input
+    assert measured.distance.hausdorff < 1e-6
+
+
+def test_regions_and_data_of_sheets_are_kept():
+    points, faces = SHAPES["two_boxes"]()
+    surface = Surface(points, faces)
+    middle = points[faces].mean(axis=1)
+    labels = np.where(np.abs(middle[:, 0] - 1.0) < 1e-9, 7, np.where(middle[:, 0] < 1.0, 1, 2))
+    mesh = Mesh(surface=surface, regions={"material": Regions(labels)}, point_data={"x": points[:, 0]})
+    result = anisomesh.remesh(mesh, n_vertices=120, embedding="direct", threads=1)
+    check_joined(surface, result, 120)
+    made, found = result.mesh.surface, result.mesh.regions["material"].labels
+    for label in (1, 2, 7):
+        expected = surface.face_areas[labels == label].sum()
+        assert made.face_areas[found == label].sum() == pytest.approx(expected, rel=1e-6)
+    assert np.allclose(result.mesh.point_data["x"], made.points[:, 0], atol=1e-6)
+
+
+def test_sheets_that_cannot_be_joined_are_apart_and_it_is_said(monkeypatch):
+    monkeypatch.setattr(join.JoinTask, "conforming", lambda self, mesh: None)
+    surface = Surface(*SHAPES["tee"]())
+    result = anisomesh.remesh(surface, n_vertices=120, embedding="direct", threads=1)
+    assert [warning for warning in result.warnings if "separate in the result" in warning]
+    assert result.surface.n_points == 120
+    assert result.validity.nonmanifold_edges == 0

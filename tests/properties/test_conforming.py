@@ -1,0 +1,78 @@
+"""Chains of boundaries that are given the same vertices."""
+
+import numpy as np
+import pytest
+from junction_shapes import square
+
+from anisomesh.conforming.boundary_places import boundary_places
+from anisomesh.conforming.chains import Bundle, Chain, conform
+from anisomesh.mesh.surface import Surface
+from anisomesh.mesh.topology import boundary_loops, euler_characteristic
+
+CURVE = np.stack([0.3 * np.sin(np.linspace(0, 2, 41)), np.linspace(0, 2, 41), np.zeros(41)], axis=1)
+START = np.concatenate([[0.0], np.cumsum(np.linalg.norm(np.diff(CURVE, axis=0), axis=1))])
+
+
+def on_curve(places):
+    return np.stack([np.interp(places, START, CURVE[:, axis]) for axis in range(3)], axis=1)
+
+
+def strips(counts, rng):
+    """Return strips beside the curve with so many vertices on it at random places, and their chains."""
+    points, faces, chains, first = [], [], [], 0
+    for number, count in enumerate(counts):
+        places = np.concatenate([[0.0], np.sort(rng.uniform(0.0, START[-1], count - 2)), START[-1:]])
+        angle = 2.0 * np.pi * number / len(counts)
+        away = 0.5 * np.array([np.cos(angle), 0.0, np.sin(angle)])
+        row = first + np.arange(count)
+        points += [on_curve(places), on_curve(places) + away]
+        a, b, c, d = row[:-1], row[1:], row[1:] + count, row[:-1] + count
+        faces += [np.stack([a, b, c], axis=1), np.stack([a, c, d], axis=1)]
+        chains.append(Chain(row, places))
+        first += 2 * count
+    return np.concatenate(points), np.concatenate(faces).astype(np.int32), chains
+
+
+@pytest.mark.parametrize("seed", range(10))
+def test_chains_get_the_same_vertices_in_order(seed):
+    rng = np.random.default_rng(seed)
+    counts = rng.integers(2, 30, size=rng.integers(2, 6))
+    points, faces, chains = strips(counts, rng)
+    made = conform(points, faces, [Bundle(CURVE, chains)])
+    (table,) = made.chains
+    assert max(counts) <= table.shape[1] <= counts.sum()
+    assert (made.points[table] == made.points[table[:1]]).all()
+    assert np.allclose(points[table[np.argmax(counts)][table[np.argmax(counts)] < len(points)]][0], on_curve([0.0])[0])
+    height = made.points[table[0], 1]
+    assert (np.diff(height) > 0.0).all()  # no vertex has passed another one
+    surface = Surface(made.points, made.faces)
+    boundary = {tuple(edge) for edge in np.sort(surface.edges[surface.edge_face_count == 1], axis=1).tolist()}
+    for chain in table:
+        assert {tuple(sorted(pair)) for pair in zip(chain[:-1].tolist(), chain[1:].tolist(), strict=True)} <= boundary
+    assert euler_characteristic(made.faces) == euler_characteristic(faces)
+    assert made.faces[: len(faces)].shape == faces.shape
+
+
+@pytest.mark.parametrize("least", [1, 2, 5])
+def test_a_curve_gets_at_least_so_many_vertices(least):
+    points, faces, chains = strips([2, 2, 2], np.random.default_rng(0))
+    (table,) = conform(points, faces, [Bundle(CURVE, chains, least)]).chains
+    assert table.shape == (3, 2 + least)
+
+
+def test_loops_at_the_same_place_are_told_apart():
+    """Two sheets that have their whole boundary in common, one above the other."""
+    reference, mesh = (
+        [square(n, n, lambda u, v, s=s: (u, v, s * u * v * (1 - u) * (1 - v) * 4)) for s in (1, -1)] for n in (21, 7)
+    )
+    joint = [
+        Surface(np.concatenate([one[0], two[0]]), np.concatenate([one[1], two[1] + len(one[0])]))
+        for one, two in (reference, mesh[::-1])
+    ]
+    placed = boundary_places(joint[1], joint[0], [loop.astype(np.int64) for loop in boundary_loops(joint[0].faces)])
+    assert placed is not None
+    first = [int(loop[0]) < 441 for loop in boundary_loops(joint[0].faces)]
+    for upper, found in zip(first, placed, strict=True):
+        assert (found.points >= 49).all() == upper  # the sheets of the mesh are in the other order
+        assert (np.diff(found.places) > 0.0).all()
+        assert len(found.points) == 24
