@@ -108,6 +108,8 @@ class RemeshOptions:
         plain CVT (``sharpness`` 1) does not follow them.
     features
         Edges of the input that are creases in any case, as pairs of its points (n, 2).
+    keep_points
+        Points of the input (n,) that are vertices of the result, at the same coordinates.
     regions
         Whether edges of the result follow the borders between regions of a :class:`~anisomesh.attributes.model.Mesh`
         and the seams of its corner data, also where the surface is smooth.
@@ -143,6 +145,7 @@ class RemeshOptions:
     weld_tolerance: float | Literal["auto"] = 0.0
     feature_angle: float = 40.0
     features: npt.ArrayLike | None = None
+    keep_points: npt.ArrayLike | None = None
     regions: bool = True
     attributes: bool = True
     time_limit: float | None = None

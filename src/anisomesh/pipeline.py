@@ -119,13 +119,13 @@ def remesh(
             run.on_step(StepInfo(stage="search", message=f"{n:,} vertices"))
             return _remesh(source, n, options, run, nearest=True)
 
-        result = smallest_within(with_vertices, prepared, max_error, deadline)
+        result = smallest_within(with_vertices, prepared, max_error, deadline, least=source.least)
     elif n_vertices is None and ratio is None:
-        n = count_for_length(source, options, run)
+        n = max(source.least, count_for_length(source, options, run))
         result = _remesh(source, n, options, run, asked=options.absolute_length)
     else:
         n = n_vertices or max(MIN_VERTICES, round((ratio or 0.0) * prepared.n_points))
-        result = _remesh(source, n, options, run)
+        result = _remesh(source, source.checked_count(n), options, run)
     return _with_attributes(result, given, run) if options.attributes else result
 
 
@@ -162,7 +162,7 @@ def _remesh(
     made = _valid_mesh(task, tasks.fit, measured.options, run)
     mesh, optimised, validity = made.mesh, made.optimised, made.validity
     agreement = _agreement(mesh, tasks, asked) if asked or task.error_weights is not None else None
-    surface = Surface(frame.to_model(mesh.points), mesh.faces)
+    surface = Surface(source.to_model(mesh.points, frame), mesh.faces)
     return RemeshResult(
         surface=surface,
         mesh=Mesh(surface=surface),

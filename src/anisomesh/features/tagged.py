@@ -9,7 +9,7 @@ import numpy as np
 import numpy.typing as npt
 from scipy.spatial import cKDTree
 
-from anisomesh._arrays import EdgeMask, PointMask
+from anisomesh._arrays import EdgeMask
 from anisomesh.errors import OptionError
 from anisomesh.mesh.surface import Surface
 from anisomesh.mesh.topology import edge_keys
@@ -47,7 +47,7 @@ def tagged_edges(
     tree = cKDTree(prepared.points)
     found = np.zeros(len(prepared.edges), dtype=bool)
     keys = edge_keys(prepared.edges)
-    radius = _search_radius(input_mesh, tolerance)
+    radius = search_radius(input_mesh, tolerance)
     copies = [tree.query_ball_point(input_mesh.points[column], radius) for column in ends.T]
     wanted = [(a, b) for first, second in zip(*copies, strict=True) for a in first for b in second if a != b]
     if wanted:
@@ -55,20 +55,8 @@ def tagged_edges(
     return found
 
 
-def tagged_points(
-    input_mesh: Surface, points: npt.NDArray[np.int64], prepared: Surface, tolerance: float | Literal["auto"]
-) -> PointMask:
-    """Return which points (V,) of the prepared surface are at points (n,) of the input mesh.
-
-    The other parameters are the ones of :func:`tagged_edges`.
-    """
-    found = np.zeros(prepared.n_points, dtype=bool)
-    distance, nearest = cKDTree(prepared.points).query(input_mesh.points[points])
-    found[nearest[distance <= _search_radius(input_mesh, tolerance)]] = True
-    return found
-
-
-def _search_radius(input_mesh: Surface, tolerance: float | Literal["auto"]) -> float:
+def search_radius(input_mesh: Surface, tolerance: float | Literal["auto"]) -> float:
+    """Return the distance up to which a point of the prepared surface is a point of the input, in model units."""
     return max(weld_distance(input_mesh, tolerance), _MIN_SEARCH_RADIUS * input_mesh.diagonal)
 
 

@@ -1,13 +1,23 @@
-"""Which points to hold where a changed mesh is faulty."""
+"""Which points of a mesh stay: at prescribed places, or where a changed mesh is faulty."""
 
 from __future__ import annotations
 
 import numpy as np
 from scipy.spatial import cKDTree
 
-from anisomesh._arrays import FaceLabels, FaceMask, PointMask
+from anisomesh._arrays import FaceLabels, FaceMask, PointMask, Points
 from anisomesh.mesh.surface import Surface
 from anisomesh.mesh.topology import with_neighbours
+
+
+def at_places(points: Points, places: Points) -> PointMask:
+    """Return which points (V,) are at one of some places (n, 3), to the last digit."""
+    if len(places) == 0:
+        return np.zeros(len(points), dtype=bool)
+    own, wanted = (
+        np.ascontiguousarray(array + 0.0).view(np.dtype((np.void, 24))).ravel() for array in (points, places)
+    )
+    return np.asarray(np.isin(own, wanted))
 
 
 def points_near_faces(before: Surface, after: Surface, faces: FaceLabels | FaceMask, *, rings: int) -> PointMask:

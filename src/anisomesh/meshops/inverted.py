@@ -22,7 +22,12 @@ _PLATEAU_TRIES = 32  # random moves tried for a triangle that nothing helps; wit
 
 
 def remove_inverted_triangles(
-    points: Points, faces: Faces, reference: ClosestPoints, *, deadline: Deadline = NO_DEADLINE
+    points: Points,
+    faces: Faces,
+    reference: ClosestPoints,
+    *,
+    held: Points | None = None,
+    deadline: Deadline = NO_DEADLINE,
 ) -> tuple[Points, Faces, int]:
     """Remove triangles that face away from the reference, without changing the topology.
 
@@ -32,6 +37,8 @@ def remove_inverted_triangles(
         An oriented manifold mesh (V, 3), (F, 3).
     reference
         The surface that the mesh approximates.
+    held
+        Places (n, 3) of points that stay.
     deadline
         Asked before every inverted triangle whether to end.
 
@@ -64,6 +71,7 @@ def remove_inverted_triangles(
         plateau=random_nudges,
         max_rounds=MAX_INVERSION_ROUNDS,
         max_plateaus=_MAX_INVERSION_PLATEAUS,
+        held=held,
     )
     return remove_faults(points, faces, reference, _InvertedTriangles(reference), strategy, deadline=deadline)
 

@@ -22,7 +22,13 @@ _MAX_INTERSECTION_PLATEAUS = 6
 
 
 def remove_self_intersections(
-    points: Points, faces: Faces, reference: ClosestPoints, *, max_tries: int = 300, deadline: Deadline = NO_DEADLINE
+    points: Points,
+    faces: Faces,
+    reference: ClosestPoints,
+    *,
+    held: Points | None = None,
+    max_tries: int = 300,
+    deadline: Deadline = NO_DEADLINE,
 ) -> tuple[Points, Faces, int]:
     """Remove pairs of triangles that intersect, where the reference does not, without changing the topology.
 
@@ -32,6 +38,8 @@ def remove_self_intersections(
         An oriented manifold mesh (V, 3), (F, 3).
     reference
         The surface that the mesh approximates.
+    held
+        Places (n, 3) of points that stay.
     max_tries
         Pairs that are looked at, in all rounds together; one amid many faces counts for several.
     deadline
@@ -52,6 +60,7 @@ def remove_self_intersections(
         max_rounds=MAX_INTERSECTION_ROUNDS,
         max_plateaus=_MAX_INTERSECTION_PLATEAUS,
         max_tries=max_tries,
+        held=held,
     )
     return remove_faults(points, faces, reference, _NewIntersections(reference), strategy, deadline=deadline)
 

@@ -9,20 +9,22 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from anisomesh._arrays import EdgeMask, PointMask, PointScalars, PointTensors, real_array
+from anisomesh._arrays import EdgeMask, PointMask, Points, PointScalars, PointTensors, real_array
 from anisomesh.attributes.charts import Joints, with_seams_at_corners
 from anisomesh.attributes.model import Mesh
 from anisomesh.errors import MetricError, OptionError
 from anisomesh.features.detect import sharp_edges
-from anisomesh.features.tagged import tagged_edges, tagged_points
-from anisomesh.mesh.geometry import even_edge_length
+from anisomesh.features.tagged import tagged_edges
+from anisomesh.mesh.geometry import Frame, even_edge_length
 from anisomesh.mesh.surface import Surface
+from anisomesh.meshops.anchors import Anchors, places_found
 from anisomesh.metric.sizes import checked_sizes
 from anisomesh.metric.tensors import validate_metric
-from anisomesh.options import RemeshOptions
+from anisomesh.options import MIN_VERTICES, RemeshOptions
 from anisomesh.repair.near_points import weld_distance
 from anisomesh.repair.prepare import Prepared, prepare
 from anisomesh.resolve import follows_creases, is_designed
+from anisomesh.setup.fixed import with_fixed_points
 
 _MAX_BORDER_SHARE = 0.4  # of the vertices asked for, that borders and seams may take; heuristic
 _LARGEST_DENSITY = 1e30  # and inverse of the smallest, so that energies are far from overflow
@@ -47,6 +49,10 @@ class PreparedInput:
         follow them where there are enough vertices.
     fixed
         Which of its points (V,) stay.
+    outline
+        Which of its edges (E,) stay as they are: edges of the boundary between fixed points.
+    least
+        Vertices that a mesh has at least.
     """
 
     prepared: Prepared
@@ -57,6 +63,38 @@ class PreparedInput:
     borders: EdgeMask
     seams: EdgeMask
     fixed: PointMask
+    outline: EdgeMask
+    least: int = MIN_VERTICES
+
+    def checked_count(self, n_vertices: int) -> int:
+        """Return a number of vertices, or raise OptionError if more points are kept."""
+        if n_vertices < self.least:
+            raise OptionError(
+                f"{n_vertices:,} vertices are asked for, and keep_points and fixed points of the mesh are "
+                f"{self.least:,}; ask for at least as many, or keep fewer points"
+            )
+        return n_vertices
+
+    def anchors(self, n_vertices: int, frame: Frame) -> Anchors:
+        """Return the anchors of a mesh of a number of vertices at bounding-box diagonal 1.
+
+        There are none if more points are fixed than the mesh has vertices.
+        """
+        if np.count_nonzero(self.fixed) > n_vertices:
+            return Anchors()
+        number = np.cumsum(self.fixed) - 1
+        surface = self.prepared.surface
+        return Anchors(frame.to_unit(surface.points[self.fixed]), number[surface.edges[self.outline]])
+
+    def to_model(self, points: Points, frame: Frame) -> Points:
+        """Return points (n, 3) in model units, fixed ones exactly where they are on the prepared surface."""
+        places = self.prepared.surface.points[self.fixed]
+        number = places_found(points, frame.to_unit(places))
+        return (
+            np.where((number >= 0)[:, None], places[number], frame.to_model(points))
+            if len(places)
+            else frame.to_model(points)
+        )
 
     def features_at(self, n_vertices: int, surface: Surface) -> tuple[EdgeMask, tuple[str, ...]]:
         """Return the edges (E,) to follow with a number of vertices, and what has to be said about the others.
@@ -87,7 +125,8 @@ def prepared_input(mesh: Mesh, options: RemeshOptions) -> PreparedInput:
     MetricError
         If prescribed tensors are not symmetric positive definite, one per point of the input.
     OptionError
-        If densities or sizes are not positive, one per point, or features are not edges of the input.
+        If densities or sizes are not positive, one per point, features are not edges of the input, or points to keep
+        are not points of it.
     """
     surface = mesh.surface
     prepared = prepare(surface, weld_tolerance=options.weld_tolerance)
@@ -109,6 +148,7 @@ def prepared_input(mesh: Mesh, options: RemeshOptions) -> PreparedInput:
         sizes = checked_sizes(given, prepared.surface.points, prepared.point_source)
     prescribed = [mesh.features, *([] if options.features is None else [options.features])]
     borders, seams = _borders(mesh, prepared.surface, options)
+    prepared, fixed = with_fixed_points(mesh, prepared, options)
     return PreparedInput(
         prepared=prepared,
         tensors=tensors,
@@ -117,7 +157,9 @@ def prepared_input(mesh: Mesh, options: RemeshOptions) -> PreparedInput:
         tagged=_tagged(prescribed, surface, prepared.surface, options),
         borders=borders,
         seams=seams,
-        fixed=tagged_points(surface, mesh.fixed_points, prepared.surface, options.weld_tolerance),
+        fixed=fixed,
+        least=MIN_VERTICES if options.keep_points is None else max(MIN_VERTICES, int(np.count_nonzero(fixed))),
+        outline=np.zeros(len(prepared.surface.edges), dtype=bool),
     )
 
 

@@ -79,6 +79,7 @@ def set_up(source: PreparedInput, n: int, options: RemeshOptions, run: Run, *, n
             n_vertices=n,
             deadline=run.deadline,
             error_weights=weights,
+            anchors=source.anchors(n, measured.frame),
         )
         plan = fit_plan(options, surface, nearest=nearest)
         metric = PlacedMetric(ClosestPoints(working), field if weights is None else asked)
@@ -126,7 +127,7 @@ def _fit_target(
         crease_angle=options.feature_angle,
         plan=plan,
     )
-    return replace(target, lines=task.surface.edges[tagged].astype(np.int64))
+    return replace(target, lines=task.surface.edges[tagged].astype(np.int64), anchors=task.anchors)
 
 
 def _features(
