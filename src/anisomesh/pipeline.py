@@ -35,7 +35,8 @@ from anisomesh.metric.conformity import Conformity, MetricExtent, conformity
 from anisomesh.options import MIN_VERTICES, RemeshOptions, read_target, with_overrides
 from anisomesh.resolve import cvt_options, embedding_name
 from anisomesh.result import RemeshResult
-from anisomesh.setup.inputs import PreparedInput, prepared_input
+from anisomesh.setup.inputs import prepared_input
+from anisomesh.setup.lock import Cut, cut_locked
 from anisomesh.setup.measured import count_for_length, unit_of_lengths
 from anisomesh.setup.tasks import Tasks, set_up
 from anisomesh.voronoi.restricted import RestrictedVoronoi
@@ -110,38 +111,40 @@ def remesh(
     with run.stage("load") if isinstance(mesh, str | os.PathLike) else nullcontext():
         given = mesh_of(mesh, faces)
     with run.stage("prepare"):
-        source = prepared_input(given, options)
-    prepared = source.prepared.surface
+        cut = cut_locked(prepared_input(given, options), given, options)
+    prepared = cut.whole.prepared.surface
     if max_error is not None:
         options = replace(options, denoise=False)  # the distance asked for refers to the input itself
 
         def with_vertices(n: int) -> RemeshResult:
             run.on_step(StepInfo(stage="search", message=f"{n:,} vertices"))
-            return _remesh(source, n, options, run, nearest=True)
+            return _remesh(cut, n, options, run, nearest=True)
 
-        result = smallest_within(with_vertices, prepared, max_error, deadline, least=source.least)
+        result = smallest_within(with_vertices, prepared, max_error, deadline, least=cut.least)
     elif n_vertices is None and ratio is None:
-        n = max(source.least, count_for_length(source, options, run))
-        result = _remesh(source, n, options, run, asked=options.absolute_length)
+        n = max(cut.least, cut.n_more + count_for_length(cut.rest, options, run))
+        result = _remesh(cut, n, options, run, asked=options.absolute_length)
     else:
         n = n_vertices or max(MIN_VERTICES, round((ratio or 0.0) * prepared.n_points))
-        result = _remesh(source, source.checked_count(n), options, run)
-    return _with_attributes(result, given, run) if options.attributes else result
+        result = _remesh(cut, n, options, run)
+    if cut.is_all:
+        result = replace(result, warnings=cut.remarks)
+    return _with_attributes(result, given, cut, run) if options.attributes else result
 
 
-def _with_attributes(result: RemeshResult, given: Mesh, run: Run) -> RemeshResult:
+def _with_attributes(result: RemeshResult, given: Mesh, cut: Cut, run: Run) -> RemeshResult:
     """Return a result with everything that a mesh carries."""
     if given.is_bare:
         return result
     with run.stage("attributes"):
         source = oriented_as(given, result.prepared) if result.prepare_report.faces_flipped else given
-        mesh = transfer_attributes(source, result.surface)
+        mesh = cut.with_exact_attributes(transfer_attributes(source, result.surface), source)
     warnings = (*result.warnings, *losses_of_attributes(given, mesh))
     return replace(result, mesh=mesh, seconds=run.total_seconds(), warnings=warnings)
 
 
 def _remesh(
-    source: PreparedInput,
+    cut: Cut,
     n: int,
     options: RemeshOptions,
     run: Run,
@@ -149,20 +152,24 @@ def _remesh(
     nearest: bool = False,
     asked: float | None = None,
 ) -> RemeshResult:
-    """Remesh a prepared surface with n vertices.
+    """Remesh what is not locked of a prepared surface, such that the whole has n vertices.
 
     ``nearest`` if the distance counts more than the shape, and ``asked`` is the length of edges in the metric if that
     was asked for.
     """
-    prepared, tasks = source.prepared, set_up(source, n, options, run, nearest=nearest)
+    source, prepared = cut.rest, cut.whole.prepared
+    tasks = set_up(source, cut.count_of_rest(n), options, run, nearest=nearest)
     measured, task = tasks.measured, tasks.dual
     frame, field = measured.frame, measured.field
     run.check_time()
     order = task.voronoi.embedded.face_order
     made = _valid_mesh(task, tasks.fit, measured.options, run)
-    mesh, optimised, validity = made.mesh, made.optimised, made.validity
+    mesh, optimised = made.mesh, made.optimised
     agreement = _agreement(mesh, tasks, asked) if asked or task.error_weights is not None else None
-    surface = Surface(source.to_model(mesh.points, frame), mesh.faces)
+    rest, reference = (
+        Surface(source.to_model(each.points, frame), each.faces) for each in (mesh, measured.surface)
+    )
+    surface, validity = cut.checked(rest, reference, made.validity)
     return RemeshResult(
         surface=surface,
         mesh=Mesh(surface=surface),
@@ -187,12 +194,13 @@ def _remesh(
         seconds=run.total_seconds(),
         warnings=(
             *losses_of_repair(prepared.report),
+            *cut.remarks,
             *measured.remarks,
             *field.remarks,
             *losses_of_shape(
                 measured.surface, Surface(mesh.points, mesh.faces), task.corner_places, made.feature_distance
             ),
-            *caveats(n, field.noise, mesh, validity, optimised, measured.options),
+            *caveats(n, field.noise, replace(mesh, points=surface.points), validity, optimised, measured.options),
             *(() if agreement is None else unfollowed_sizes(agreement)),
         ),
         conformity=agreement,
