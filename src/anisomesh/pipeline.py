@@ -166,9 +166,7 @@ def _remesh(
     made = _valid_mesh(task, tasks.fit, measured.options, run)
     mesh, optimised = made.mesh, made.optimised
     agreement = _agreement(mesh, tasks, asked) if asked or task.error_weights is not None else None
-    rest, reference = (
-        Surface(source.to_model(each.points, frame), each.faces) for each in (mesh, measured.surface)
-    )
+    rest, reference = (Surface(source.to_model(each.points, frame), each.faces) for each in (mesh, measured.surface))
     surface, validity = cut.checked(rest, reference, made.validity)
     return RemeshResult(
         surface=surface,

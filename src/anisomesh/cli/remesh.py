@@ -71,6 +71,13 @@ def command(
             metavar="FILE", help="Vertices to keep where they are: a text file, a vertex number of IN per line, from 0."
         ),
     ] = None,
+    lock: Annotated[
+        list[str] | None,
+        _input(
+            metavar="REGION",
+            help="Leave the triangles of this region of IN as they are, by its name or label; may be repeated.",
+        ),
+    ] = None,
     density: Annotated[
         Path | None,
         _input(
@@ -118,6 +125,7 @@ def command(
 
         readers = {"features": load_pairs, "keep_points": load_points, "density": load_numbers}
         options |= {name: readers[name](path) for name, path in files.items() if path is not None}
+    options["lock"] = lock or None
     with progress(quiet) as display:
         mesh, seconds = read_mesh(source, input_format)
         options |= {"n_vertices": n_vertices, "ratio": ratio}

@@ -75,9 +75,7 @@ def _step(mesh: LinedMesh, place: Floats, facet: int, weights: Floats, held: Int
     """Return the step that brings a vertex to a place on a face: the first sound one, or else a split."""
     steps = list(_steps(mesh, place, facet, weights, held))
     for step in steps:
-        corners = np.unique(mesh.surface.faces[step.change.gone])
-        patch = mesh.patch(corners.tolist(), reference)
-        if is_sound(patch, _in_patch(step.change, patch.points, patch.faces, mesh.surface.n_points)):
+        if is_sound(*mesh.on_patch(step.change, reference)):
             return step
     return steps[-1]
 
@@ -99,12 +97,3 @@ def _steps(mesh: LinedMesh, place: Floats, facet: int, weights: Floats, held: In
     yield Step(change=face_split(surface, facet, place))
     if inside and weights[side] <= 0.0:
         yield mesh.split(edge, place)
-
-
-def _in_patch(change: Change, points: Ints, faces: Ints, n_points: int) -> Change:
-    """Return a change of a mesh of some points as one of the patch of these points (V,) and faces (F,)."""
-
-    def number(values: Ints) -> Ints:
-        return np.where(values >= n_points, values - n_points + len(points), np.searchsorted(points, values))
-
-    return Change(np.searchsorted(faces, change.gone), number(change.new), number(change.points), change.places)

@@ -95,11 +95,19 @@ class LinedMesh:
         """Return the points that share an edge with a point."""
         return set(self.surface.faces[self.star(point)].ravel().tolist()) - {point}
 
-    def patch(self, points: Sequence[int], reference: ClosestPoints) -> Patch:
-        """Return the faces at some points as a patch."""
-        faces = np.unique(np.concatenate([self.star(point) for point in points]))
+    def on_patch(self, change: Change, reference: ClosestPoints) -> tuple[Patch, Change]:
+        """Return the patch of all faces at the faces that a change takes away, and the change as one of it."""
+        corners = np.unique(self.surface.faces[change.gone]).tolist()
+        faces = np.unique(np.concatenate([self.star(corner) for corner in corners]))
         none, held = np.zeros(len(faces), dtype=bool), np.zeros(self.surface.n_points, dtype=bool)
-        return Patch.cut(self.surface, faces, faces[:0], none, reference, held)
+        patch = Patch.cut(self.surface, faces, faces[:0], none, reference, held)
+        n, gone = self.surface.n_points, np.searchsorted(faces, change.gone)
+
+        def number(points: Ints) -> Ints:
+            own = np.searchsorted(patch.points, points)
+            return np.where(points >= n, points - n + len(patch.points), own)
+
+        return patch, Change(gone, number(change.new), number(change.points), change.places)
 
     def split(self, edge: int, place: Floats) -> Step:
         """Return the split of an edge at a place (3,)."""

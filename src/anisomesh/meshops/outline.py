@@ -7,7 +7,7 @@ import numpy as np
 from anisomesh.mesh import geometry
 from anisomesh.mesh.closest_points import ClosestPoints
 from anisomesh.meshops.anchors import Anchors
-from anisomesh.meshops.change import Change, Floats, Ints, Patch
+from anisomesh.meshops.change import Change, Floats, Ints
 from anisomesh.meshops.engine import is_sound_in_shape
 from anisomesh.meshops.lined_mesh import LinedMesh, Step, disjoint
 from anisomesh.meshops.loops import Stops, SurfaceBoundary
@@ -33,9 +33,9 @@ def conform_boundary(mesh: LinedMesh, anchors: Anchors, reference: ClosestPoints
     Notes
     -----
     Points and anchors are put in order along each loop. The point nearest to a missing anchor moves there, if no
-    triangle gets inverted or thin; for the others the edge of the boundary is split. Then points between consecutive anchors of
-    the outline are collapsed into their neighbours on the boundary. A collapse that the link condition forbids becomes
-    possible when the edge in its way has been split.
+    triangle gets inverted or thin; for the others the edge of the boundary is split. Then points between consecutive
+    anchors of the outline are collapsed into their neighbours on the boundary. A collapse that the link condition
+    forbids becomes possible when the edge in its way has been split.
     """
     boundary = SurfaceBoundary(reference.surface, anchors)
     for steps_of in (_insertions, _collapses):
@@ -78,7 +78,7 @@ def _move(mesh: LinedMesh, stops: Stops, stop: int, anchor: int, reference: Clos
         return None
     star, place = mesh.star(point), stops.places[anchor]
     change = Change(star, mesh.surface.faces[star].astype(np.int64), np.array([point]), place[None])
-    if not _is_sound(mesh, change, [point], reference):
+    if not is_sound_in_shape(*mesh.on_patch(change, reference)):
         return None
     return Step(change=change, replaced=point, place=place)
 
@@ -109,7 +109,7 @@ def _collapses(mesh: LinedMesh, stops: Stops, reference: ClosestPoints) -> Liste
                 around = [mesh.star(point) for point in (gone, *sides)]
                 found.append((step, np.concatenate(around)))
             continue
-        best = max(possible, key=lambda option: _merit(mesh, option[1], gone, reference))
+        best = max(possible, key=lambda option: _merit(mesh, option[1], reference))
         into, change = best
         step = Step(change=change, replaced=gone, place=mesh.surface.points[into])
         found.append((step, np.concatenate([mesh.star(gone), mesh.star(into)])))
@@ -124,13 +124,16 @@ def _collapse(mesh: LinedMesh, gone: int, into: int) -> Change | None:
     common = mesh.neighbours(gone) & mesh.neighbours(into)
     if len(common) != 1 or len(faces) - len(left) != 1 or len(mesh.star(into)) + len(faces) <= 2:
         return None
+    if len(left) == 0:  # an ear: the face behind it is listed, so that its corners count as used
+        behind = int(mesh.surface.face_neighbours[star[0], np.argmax(faces[0] == gone)])
+        return Change(np.append(star, behind), mesh.surface.faces[[behind]].astype(np.int64))
     return Change(star, np.where(left == gone, into, left))
 
 
-def _merit(mesh: LinedMesh, change: Change, point: int, reference: ClosestPoints) -> tuple[bool, float]:
-    """Return whether a change of the faces at a point is sound, and the thickness of its thinnest triangle."""
+def _merit(mesh: LinedMesh, change: Change, reference: ClosestPoints) -> tuple[bool, float]:
+    """Return whether a change is sound, and the thickness of its thinnest triangle."""
     thinnest = geometry.thickness(change.corners(mesh.surface.points)).min(initial=np.inf)
-    return _is_sound(mesh, change, [point], reference), float(thinnest)
+    return is_sound_in_shape(*mesh.on_patch(change, reference)), float(thinnest)
 
 
 def _way_made(mesh: LinedMesh, gone: int, sides: tuple[int, int]) -> Step | None:
@@ -144,11 +147,3 @@ def _way_made(mesh: LinedMesh, gone: int, sides: tuple[int, int]) -> Step | None
                 if surface.edge_face_count[edge] == 2:
                     return mesh.split(edge, surface.points[surface.edges[edge]].mean(axis=0))
     return None
-
-
-def _is_sound(mesh: LinedMesh, change: Change, points: list[int], reference: ClosestPoints) -> bool:
-    """Return whether a change of the faces at some points makes no triangle inverted or thin."""
-    patch: Patch = mesh.patch(points, reference)
-    number = np.searchsorted(patch.points, change.new)
-    moved = np.searchsorted(patch.points, change.points)
-    return is_sound_in_shape(patch, Change(np.searchsorted(patch.faces, change.gone), number, moved, change.places))

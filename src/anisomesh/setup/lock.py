@@ -138,7 +138,6 @@ class Cut:
         whole = self.joined(rest)
         return whole, check_validity(whole, self.joined(reference))
 
-
     def with_exact_attributes(self, mesh: Mesh, given: Mesh) -> Mesh:
         """Return a result with everything that the given mesh carries on locked faces and their points."""
         if not self.locked.any():
@@ -162,8 +161,12 @@ def cut_locked(whole: PreparedInput, mesh: Mesh, options: RemeshOptions) -> Cut:
         locked, face_source = _found(whole.prepared, mesh, np.flatnonzero(chosen), weld)
         lost = np.count_nonzero(chosen) - len(np.unique(face_source))
         if not locked.any():
-            raise OptionError("lock has only faces that the repair of the mesh changes; lock others, or repair it first")
-    remarks = [f"{lost:,} of {chosen.sum():,} locked faces were changed by the repair and are not locked"] if lost else []
+            raise OptionError(
+                "lock has only faces that the repair of the mesh changes; lock others, or repair it first"
+            )
+    remarks = (
+        [f"{lost:,} of {chosen.sum():,} locked faces were changed by the repair and are not locked"] if lost else []
+    )
     if locked.all():
         remarks.append("all faces are locked: the result is the input")
     is_part = locked.any() and not locked.all()
