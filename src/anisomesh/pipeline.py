@@ -167,7 +167,7 @@ def _remesh(
     mesh, optimised = made.mesh, made.optimised
     agreement = _agreement(mesh, tasks, asked) if asked or task.error_weights is not None else None
     rest, reference = (Surface(source.to_model(each.points, frame), each.faces) for each in (mesh, measured.surface))
-    surface, validity = cut.checked(rest, reference, made.validity)
+    surface, validity = cut.checked(rest, reference, made.validity, run.deadline)
     return RemeshResult(
         surface=surface,
         mesh=Mesh(surface=surface),

@@ -21,7 +21,7 @@ def with_first_rows(target: Mesh, source: Mesh, points: Ints, faces: Ints, dista
     source
         The other mesh.
     points, faces
-        Its points (n,) and faces (m,) that are the first points and faces of the target, up to the order of the corners.
+        Its points (n,) and faces (m,) that are the first ones of the target, up to the order of the corners.
     distance
         Distance, in model units, up to which points of the source are the same.
     """

@@ -13,12 +13,16 @@ from anisomesh.attributes.charts import Joints
 from anisomesh.attributes.exact import with_first_rows
 from anisomesh.attributes.model import Ints, Mesh
 from anisomesh.errors import OptionError
+from anisomesh.execution.deadline import NO_DEADLINE, Deadline
+from anisomesh.mesh.closest_points import ClosestPoints
 from anisomesh.mesh.geometry import sums_at_points
 from anisomesh.mesh.surface import Surface
 from anisomesh.mesh.topology import corner_fans, edge_keys, side_pairs
 from anisomesh.mesh.validity import Validity, check_validity
 from anisomesh.mesh.weld import coincident
 from anisomesh.meshops.anchors import places_found
+from anisomesh.meshops.inverted import remove_inverted_triangles
+from anisomesh.meshops.self_intersections import remove_self_intersections
 from anisomesh.options import MIN_VERTICES, RemeshOptions
 from anisomesh.repair.near_points import weld_distance
 from anisomesh.repair.prepare import Prepared
@@ -123,7 +127,9 @@ class Cut:
         index[shared] = np.searchsorted(self.points, self.source[border[number[shared]]])
         return Surface(np.concatenate([points, rest.points[~shared]]), np.concatenate([faces, index[rest.faces]]))
 
-    def checked(self, rest: Surface, reference: Surface, validity: Validity) -> tuple[Surface, Validity]:
+    def checked(
+        self, rest: Surface, reference: Surface, validity: Validity, deadline: Deadline = NO_DEADLINE
+    ) -> tuple[Surface, Validity]:
         """Return the result with a mesh of the rest, and its validity.
 
         Parameters
@@ -132,11 +138,35 @@ class Cut:
             The mesh and the surface that it was made for, in model units.
         validity
             The validity of the mesh itself.
+        deadline
+            When to stop mending faults.
+
+        Notes
+        -----
+        A mesh of the rest that is valid can be inverted against locked faces or intersect them, as on the other side of
+        a thin plate. Such faults are mended by local changes, which are kept if they touch no locked face.
         """
         if not self.locked.any():
             return rest, validity
-        whole = self.joined(rest)
-        return whole, check_validity(whole, self.joined(reference))
+        whole, expected = self.joined(rest), self.joined(reference)
+        validity = check_validity(whole, expected)
+        if validity.inverted + validity.new_intersections:
+            mended = self._mended(whole, ClosestPoints(expected), deadline)
+            after = check_validity(mended, expected)
+            if after.inverted + after.new_intersections < validity.inverted + validity.new_intersections:
+                return mended, after
+        return whole, validity
+
+    def _mended(self, mesh: Surface, reference: ClosestPoints, deadline: Deadline) -> Surface:
+        """Return a result with faults removed by local changes, itself if that changes locked faces."""
+        n_points, n_faces = len(self.points), int(np.count_nonzero(self.locked))
+        kept = self.rest.prepared.surface.points[self.rest.fixed & ~self._border]
+        held = np.concatenate([mesh.points[:n_points], kept])
+        points, faces, _ = remove_inverted_triangles(mesh.points, mesh.faces, reference, held=held, deadline=deadline)
+        points, faces, _ = remove_self_intersections(points, faces, reference, held=held, deadline=deadline)
+        same = np.array_equal(points[:n_points], mesh.points[:n_points])
+        same &= np.array_equal(faces[:n_faces], mesh.faces[:n_faces])
+        return Surface(points, faces) if same else mesh
 
     def with_exact_attributes(self, mesh: Mesh, given: Mesh) -> Mesh:
         """Return a result with everything that the given mesh carries on locked faces and their points."""
@@ -159,11 +189,9 @@ def cut_locked(whole: PreparedInput, mesh: Mesh, options: RemeshOptions) -> Cut:
     locked, face_source, lost = np.zeros(surface.n_faces, dtype=bool), np.zeros(0, dtype=np.int64), 0
     if chosen.any():
         locked, face_source = _found(whole.prepared, mesh, np.flatnonzero(chosen), weld)
-        lost = np.count_nonzero(chosen) - len(np.unique(face_source))
+        lost = int(np.count_nonzero(chosen)) - len(np.unique(face_source))
         if not locked.any():
-            raise OptionError(
-                "lock has only faces that the repair of the mesh changes; lock others, or repair it first"
-            )
+            raise OptionError("lock has only faces that the repair of the mesh changes; lock others")
     remarks = (
         [f"{lost:,} of {chosen.sum():,} locked faces were changed by the repair and are not locked"] if lost else []
     )
@@ -183,7 +211,7 @@ def cut_locked(whole: PreparedInput, mesh: Mesh, options: RemeshOptions) -> Cut:
 
 
 def _found(prepared: Prepared, mesh: Mesh, wanted: Ints, weld: float) -> tuple[FaceMask, Ints]:
-    """Return which prepared faces (F,) are some faces (n,) of the mesh, and the face of the mesh (m,) for each of them."""
+    """Return which prepared faces (F,) are some faces (n,) of the mesh, and for each of them (m,) which one."""
     label = Joints(mesh.surface, weld).place
     known, first = np.unique(np.sort(label[mesh.surface.faces[wanted]], axis=1), axis=0, return_index=True)
     row = _rows_found(np.sort(label[prepared.point_source[prepared.surface.faces]], axis=1), known)
