@@ -38,8 +38,8 @@ class RemeshResult:
     prepare_report
         What the repair did, as counts.
     working
-        The surface that was embedded: what is not locked of the prepared input at bounding-box diagonal 1, slivers and long edges
-        triangulated anew, noise removed. Its triangles may differ from the triangles of ``prepared``.
+        The surface that was embedded: the prepared input at bounding-box diagonal 1, without locked faces, slivers and
+        long edges triangulated anew, noise removed. Its triangles may differ from the triangles of ``prepared``.
     tensors
         The metric at the points of ``working`` (V, 3, 3), at bounding-box diagonal 1.
     corner_tensors

@@ -94,6 +94,16 @@ def test_a_locked_region_stays_where_noise_is_removed_around_it():
     assert_locked(result, noisy, mask, 500)
 
 
+@pytest.mark.parametrize("fit", [True, False])
+def test_no_triangle_is_inverted_against_the_locked_side_of_a_thin_plate(fit):
+    """The mesh of the rest does not know of that side, and its edges cut the rim below it."""
+    plate = box((1.0, 1.0, 0.005), n=12)
+    mask = (middles(plate)[:, 2] > 0.0049) & (middles(plate)[:, 0] < 0.5)
+    result = anisomesh.remesh(plate, n_vertices=220, lock=mask, fit=fit)
+    assert_locked(result, plate, mask, result.surface.n_points)
+    assert result.surface.n_points == pytest.approx(220, rel=0.05)
+
+
 def test_a_soup_with_reversed_triangles_is_locked_too():
     faces = BALL.faces.copy()
     faces[::3] = faces[::3][:, ::-1]

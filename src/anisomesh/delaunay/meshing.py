@@ -24,7 +24,7 @@ from anisomesh.meshops.anchors import Anchors
 from anisomesh.meshops.decimation import decimate, ends_of_creases
 from anisomesh.meshops.edge_recovery import recover_edges
 from anisomesh.meshops.flip import flip_for_shape
-from anisomesh.meshops.held import at_places
+from anisomesh.meshops.held import Held, at_places
 from anisomesh.meshops.inverted import remove_inverted_triangles
 from anisomesh.meshops.self_intersections import remove_self_intersections
 from anisomesh.meshops.split import split_longest_edges
@@ -239,7 +239,7 @@ def _with_anchors(task: MeshingTask, mesh: FeatureMesh) -> FeatureMesh | None:
 def _without_inverted(task: MeshingTask, mesh: FeatureMesh) -> FeatureMesh:
     """Return the mesh with inverted triangles repaired, and the crease edges and locked points that have not moved."""
     points, faces, _ = remove_inverted_triangles(
-        mesh.points, mesh.faces, task.reference, held=task.anchors.places, deadline=task.deadline
+        mesh.points, mesh.faces, task.reference, held=Held(task.anchors.places), deadline=task.deadline
     )
     if points is mesh.points:
         return FeatureMesh(points, faces, mesh.crease_edges, mesh.locked)
@@ -273,7 +273,7 @@ def _without_crossings(task: MeshingTask, mesh: FeatureMesh, tries: int) -> tupl
     """Return the mesh and its crease edges, without new self-intersections and with no more points where possible."""
     reference, n_wanted, held = task.reference, max(task.n_vertices, len(mesh.points)), task.anchors.places
     points, faces, crossing = remove_self_intersections(
-        mesh.points, mesh.faces, reference, held=held, max_tries=tries, deadline=task.deadline
+        mesh.points, mesh.faces, reference, held=Held(held), max_tries=tries, deadline=task.deadline
     )
     creases = edges_left(faces, renumbered(mesh.points, points)[mesh.crease_edges])
     for _ in range(_MAX_TRIMS):
@@ -285,7 +285,7 @@ def _without_crossings(task: MeshingTask, mesh: FeatureMesh, tries: int) -> tupl
         )
         found = trimmed.surface
         coarser = remove_self_intersections(
-            found.points, found.faces, reference, held=held, max_tries=_TRIM_TRIES, deadline=task.deadline
+            found.points, found.faces, reference, held=Held(held), max_tries=_TRIM_TRIES, deadline=task.deadline
         )
         if coarser[2] > crossing:
             break

@@ -15,7 +15,7 @@ from anisomesh.mesh.surface import Surface
 from anisomesh.mesh.topology import with_neighbours
 from anisomesh.mesh.validity import faulty_faces
 from anisomesh.meshops.decimation import decimate
-from anisomesh.meshops.held import points_near_faces
+from anisomesh.meshops.held import Held, points_near_faces
 from anisomesh.meshops.inverted import remove_inverted_triangles
 from anisomesh.meshops.self_intersections import remove_self_intersections
 
@@ -92,7 +92,7 @@ def _fitted(
 
 def _repaired(mesh: Surface, target: FitTarget, deadline: Deadline) -> Surface:
     """Return a mesh with faults removed by local changes, itself if that takes more points."""
-    reference, held = target.reference, target.anchors.places
+    reference, held = target.reference, Held(target.anchors.places)
     points, faces, _ = remove_inverted_triangles(mesh.points, mesh.faces, reference, held=held, deadline=deadline)
     points, faces, _ = remove_self_intersections(
         points, faces, reference, held=held, max_tries=_MAX_REPAIRS, deadline=deadline

@@ -14,7 +14,7 @@ from anisomesh.mesh import geometry
 from anisomesh.mesh.closest_points import ClosestPoints
 from anisomesh.mesh.surface import Surface
 from anisomesh.meshops.change import Change, Ints, Patch, apply_changes
-from anisomesh.meshops.held import at_places
+from anisomesh.meshops.held import Held, at_places
 
 _FACES_PER_TRY = 100  # a patch of more faces counts for several tries
 _MAX_PATCH = 2_000  # faces of a patch; in a larger one the mesh is crumpled, and every try takes long
@@ -60,7 +60,7 @@ class Strategy:
     max_tries
         Patches looked at in all rounds together, large ones counted as several.
     held
-        Places (n, 3) of points that stay, None if there are none.
+        Points and faces that stay.
     """
 
     candidates: Sequence[Candidates]
@@ -68,7 +68,7 @@ class Strategy:
     max_rounds: int
     max_plateaus: int
     max_tries: float = np.inf
-    held: Points | None = None
+    held: Held = field(default_factory=Held)
 
 
 def remove_faults(
@@ -105,8 +105,8 @@ def remove_faults(
     In each round every fault gets the change that leaves the fewest faults on the patch around it, if those are fewer
     than before: from the first source of candidates that has one. Changes of one round have disjoint patches. Where
     no fault can be helped the round makes changes that leave as many faults; the number of these rounds is bounded.
-    A change is made only if it keeps the topology, the boundary and held points and makes no triangle inverted or thin.
-    Patches that nothing helped are remembered, and looked at again when something on them has changed.
+    A change is made only if it keeps the topology, the boundary and what is held, and makes no triangle inverted or
+    thin. Patches that nothing helped are remembered, and looked at again when something on them has changed.
     """
     best = points, faces, -1
     search = _Search(objective, strategy, deadline)
@@ -128,10 +128,10 @@ class _Round:
     """A mesh and its faults at the start of a round, with the patches around them."""
 
     def __init__(
-        self, surface: Surface, faults: Ints, objective: Objective, reference: ClosestPoints, held: Points | None
+        self, surface: Surface, faults: Ints, objective: Objective, reference: ClosestPoints, held: Held
     ) -> None:
         self.surface, self.faults, self.reference = surface, faults, reference
-        self.held = at_places(surface.points, np.zeros((0, 3)) if held is None else held)
+        self.held, self.n_held_faces = at_places(surface.points, held.places), held.n_faces
         self.patch_faces = list(objective.patch_faces(surface, faults))
         self.faulty = np.zeros(surface.n_faces, dtype=bool)
         self.faulty[faults] = True
@@ -184,7 +184,8 @@ class _Search:
             if (number, patch.key) in self.failed:
                 continue
             self.tries += 1 + len(faces) // _FACES_PER_TRY
-            change = _best_change(patch, source, self.objective, allow_equal=on_plateau)
+            options = [each for each in source(patch) if (faces[each.gone] >= start.n_held_faces).all()]
+            change = _best_change(patch, options, self.objective, allow_equal=on_plateau)
             if change is None:
                 self.failed.add((number, patch.key))
             else:
@@ -193,13 +194,12 @@ class _Search:
         return changes
 
 
-def _best_change(patch: Patch, source: Candidates, objective: Objective, *, allow_equal: bool) -> Change | None:
+def _best_change(patch: Patch, changes: Sequence[Change], objective: Objective, *, allow_equal: bool) -> Change | None:
     """Return the sound change that leaves the fewest faults on a patch, fewer than there are (or as many), or None.
 
-    Among equally good changes it is the first of the source.
+    Among equally good changes it is the first.
     """
     least, best = objective.count(patch) + int(allow_equal), -1
-    changes = list(source(patch))
     bounds = objective.bounds_after(patch, changes)
     for k in np.argsort(bounds, kind="stable").tolist():
         if bounds[k] > least or (bounds[k] == least and best < k):

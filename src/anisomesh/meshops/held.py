@@ -2,12 +2,30 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass, field
+
 import numpy as np
 from scipy.spatial import cKDTree
 
 from anisomesh._arrays import FaceLabels, FaceMask, PointMask, Points
 from anisomesh.mesh.surface import Surface
 from anisomesh.mesh.topology import with_neighbours
+
+
+@dataclass(frozen=True, eq=False)
+class Held:
+    """What stays of a mesh while it is changed.
+
+    Attributes
+    ----------
+    places
+        Places (n, 3) of points that stay.
+    n_faces
+        Number of faces that stay: the first ones.
+    """
+
+    places: Points = field(default_factory=lambda: np.zeros((0, 3)))
+    n_faces: int = 0
 
 
 def at_places(points: Points, places: Points) -> PointMask:

@@ -16,6 +16,7 @@ from anisomesh.mesh.validity import new_intersections
 from anisomesh.meshops import candidates
 from anisomesh.meshops.change import Change, Ints, Patch, faces_beside
 from anisomesh.meshops.engine import Strategy, remove_faults
+from anisomesh.meshops.held import Held
 
 MAX_INTERSECTION_ROUNDS = 30
 _MAX_INTERSECTION_PLATEAUS = 6
@@ -26,7 +27,7 @@ def remove_self_intersections(
     faces: Faces,
     reference: ClosestPoints,
     *,
-    held: Points | None = None,
+    held: Held | None = None,
     max_tries: int = 300,
     deadline: Deadline = NO_DEADLINE,
 ) -> tuple[Points, Faces, int]:
@@ -39,7 +40,7 @@ def remove_self_intersections(
     reference
         The surface that the mesh approximates.
     held
-        Places (n, 3) of points that stay.
+        Points and faces that stay.
     max_tries
         Pairs that are looked at, in all rounds together; one amid many faces counts for several.
     deadline
@@ -60,7 +61,7 @@ def remove_self_intersections(
         max_rounds=MAX_INTERSECTION_ROUNDS,
         max_plateaus=_MAX_INTERSECTION_PLATEAUS,
         max_tries=max_tries,
-        held=held,
+        held=held or Held(),
     )
     return remove_faults(points, faces, reference, _NewIntersections(reference), strategy, deadline=deadline)
 

@@ -88,13 +88,12 @@ class PreparedInput:
 
     def to_model(self, points: Points, frame: Frame) -> Points:
         """Return points (n, 3) in model units, fixed ones exactly where they are on the prepared surface."""
+        moved = frame.to_model(points)
         places = self.prepared.surface.points[self.fixed]
-        number = places_found(points, frame.to_unit(places))
-        return (
-            np.where((number >= 0)[:, None], places[number], frame.to_model(points))
-            if len(places)
-            else frame.to_model(points)
-        )
+        if len(places):
+            number = places_found(points, frame.to_unit(places))
+            moved[number >= 0] = places[number[number >= 0]]
+        return moved
 
     def features_at(self, n_vertices: int, surface: Surface) -> tuple[EdgeMask, tuple[str, ...]]:
         """Return the edges (E,) to follow with a number of vertices, and what has to be said about the others.

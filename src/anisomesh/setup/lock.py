@@ -21,6 +21,7 @@ from anisomesh.mesh.topology import corner_fans, edge_keys, side_pairs
 from anisomesh.mesh.validity import Validity, check_validity
 from anisomesh.mesh.weld import coincident
 from anisomesh.meshops.anchors import places_found
+from anisomesh.meshops.held import Held
 from anisomesh.meshops.inverted import remove_inverted_triangles
 from anisomesh.meshops.self_intersections import remove_self_intersections
 from anisomesh.options import MIN_VERTICES, RemeshOptions
@@ -144,7 +145,7 @@ class Cut:
         Notes
         -----
         A mesh of the rest that is valid can be inverted against locked faces or intersect them, as on the other side of
-        a thin plate. Such faults are mended by local changes, which are kept if they touch no locked face.
+        a thin plate. Such faults are mended by local changes.
         """
         if not self.locked.any():
             return rest, validity
@@ -158,15 +159,13 @@ class Cut:
         return whole, validity
 
     def _mended(self, mesh: Surface, reference: ClosestPoints, deadline: Deadline) -> Surface:
-        """Return a result with faults removed by local changes, itself if that changes locked faces."""
-        n_points, n_faces = len(self.points), int(np.count_nonzero(self.locked))
+        """Return a result with faults removed by changes of faces that are not locked."""
         kept = self.rest.prepared.surface.points[self.rest.fixed & ~self._border]
-        held = np.concatenate([mesh.points[:n_points], kept])
+        places = np.concatenate([mesh.points[: len(self.points)], kept])
+        held = Held(places, int(np.count_nonzero(self.locked)))
         points, faces, _ = remove_inverted_triangles(mesh.points, mesh.faces, reference, held=held, deadline=deadline)
         points, faces, _ = remove_self_intersections(points, faces, reference, held=held, deadline=deadline)
-        same = np.array_equal(points[:n_points], mesh.points[:n_points])
-        same &= np.array_equal(faces[:n_faces], mesh.faces[:n_faces])
-        return Surface(points, faces) if same else mesh
+        return Surface(points, faces)
 
     def with_exact_attributes(self, mesh: Mesh, given: Mesh) -> Mesh:
         """Return a result with everything that the given mesh carries on locked faces and their points."""
