@@ -7,7 +7,7 @@ from anisomesh.mesh.closest_points import ClosestPoints
 from anisomesh.mesh.surface import Surface
 from anisomesh.mesh.topology import edge_keys
 from anisomesh.mesh.validity import check_validity
-from anisomesh.meshops.anchoring import anchored
+from anisomesh.meshops.anchoring.anchored import anchored
 from anisomesh.meshops.anchors import Anchors
 from anisomesh.meshops.decimation import decimate
 from anisomesh.shapes.analytic import sphere

@@ -19,7 +19,7 @@ from anisomesh.features.network import FeatureNetwork
 from anisomesh.mesh.closest_points import ClosestPoints
 from anisomesh.mesh.surface import Surface
 from anisomesh.mesh.validity import faulty_faces
-from anisomesh.meshops.anchoring import anchored
+from anisomesh.meshops.anchoring.anchored import anchored
 from anisomesh.meshops.anchors import Anchors
 from anisomesh.meshops.decimation import decimate, ends_of_creases
 from anisomesh.meshops.edge_recovery import recover_edges

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import dataclass, field
+from functools import partial
 from typing import Protocol
 
 import numpy as np
@@ -184,8 +185,7 @@ class _Search:
             if (number, patch.key) in self.failed:
                 continue
             self.tries += 1 + len(faces) // _FACES_PER_TRY
-            options = [each for each in source(patch) if (faces[each.gone] >= start.n_held_faces).all()]
-            change = _best_change(patch, options, self.objective, allow_equal=on_plateau)
+            change = _best_change(patch, partial(_allowed, source, start), self.objective, allow_equal=on_plateau)
             if change is None:
                 self.failed.add((number, patch.key))
             else:
@@ -194,12 +194,18 @@ class _Search:
         return changes
 
 
-def _best_change(patch: Patch, changes: Sequence[Change], objective: Objective, *, allow_equal: bool) -> Change | None:
+def _allowed(source: Candidates, start: _Round, patch: Patch) -> list[Change]:
+    """Return the changes of a source that leave the faces as they are that stay."""
+    return [change for change in source(patch) if (patch.faces[change.gone] >= start.n_held_faces).all()]
+
+
+def _best_change(patch: Patch, source: Candidates, objective: Objective, *, allow_equal: bool) -> Change | None:
     """Return the sound change that leaves the fewest faults on a patch, fewer than there are (or as many), or None.
 
-    Among equally good changes it is the first.
+    Among equally good changes it is the first of the source.
     """
     least, best = objective.count(patch) + int(allow_equal), -1
+    changes = list(source(patch))
     bounds = objective.bounds_after(patch, changes)
     for k in np.argsort(bounds, kind="stable").tolist():
         if bounds[k] > least or (bounds[k] == least and best < k):

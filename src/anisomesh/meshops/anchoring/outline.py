@@ -6,11 +6,11 @@ import numpy as np
 
 from anisomesh.mesh import geometry
 from anisomesh.mesh.closest_points import ClosestPoints
+from anisomesh.meshops.anchoring.lined_mesh import LinedMesh, Step, disjoint
+from anisomesh.meshops.anchoring.loops import Stops, SurfaceBoundary
 from anisomesh.meshops.anchors import Anchors
 from anisomesh.meshops.change import Change, Floats, Ints
 from anisomesh.meshops.engine import is_sound_in_shape
-from anisomesh.meshops.lined_mesh import LinedMesh, Step, disjoint
-from anisomesh.meshops.loops import Stops, SurfaceBoundary
 
 _MAX_OUTLINE_ROUNDS = 60  # of insertions, and of collapses
 _NEAR_STOP = 0.3  # of the distance to the next stop, up to which a point off the outline moves to an anchor; heuristic

@@ -6,11 +6,11 @@ import numpy as np
 
 from anisomesh._arrays import EdgeEnds, Faces, Points
 from anisomesh.mesh.closest_points import ClosestPoints
+from anisomesh.meshops.anchoring.insertion import insert_places
+from anisomesh.meshops.anchoring.lined_mesh import LinedMesh
+from anisomesh.meshops.anchoring.outline import conform_boundary
 from anisomesh.meshops.anchors import Anchors
 from anisomesh.meshops.held import at_places
-from anisomesh.meshops.insertion import insert_places
-from anisomesh.meshops.lined_mesh import LinedMesh
-from anisomesh.meshops.outline import conform_boundary
 
 
 def anchored(

@@ -8,11 +8,11 @@ import numpy as np
 
 from anisomesh._arrays import Points
 from anisomesh.mesh.closest_points import ClosestPoints
+from anisomesh.meshops.anchoring.lined_mesh import LinedMesh, Step, disjoint
 from anisomesh.meshops.anchors import Anchors
 from anisomesh.meshops.change import Change, Floats, Ints
 from anisomesh.meshops.engine import is_sound
 from anisomesh.meshops.held import at_places
-from anisomesh.meshops.lined_mesh import LinedMesh, Step, disjoint
 from anisomesh.meshops.split import face_split
 
 _MAX_INSERTIONS = 30  # of insertions; each has at least one for every face that places are on
