@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 import os
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, fields, replace
 from typing import TYPE_CHECKING, Any, Literal, get_args
 
@@ -108,6 +108,12 @@ class RemeshOptions:
         plain CVT (``sharpness`` 1) does not follow them.
     features
         Edges of the input that are creases in any case, as pairs of its points (n, 2).
+    keep_points
+        Points of the input (n,) that are vertices of the result, at the same coordinates.
+    lock
+        Regions of the input whose points and triangles stay as they are, while the rest is remeshed up to them: the
+        name or label of a region of the :class:`~anisomesh.attributes.model.Mesh`, several of these, or a mask of the
+        faces (F,).
     regions
         Whether edges of the result follow the borders between regions of a :class:`~anisomesh.attributes.model.Mesh`
         and the seams of its corner data, also where the surface is smooth.
@@ -143,6 +149,8 @@ class RemeshOptions:
     weld_tolerance: float | Literal["auto"] = 0.0
     feature_angle: float = 40.0
     features: npt.ArrayLike | None = None
+    keep_points: npt.ArrayLike | None = None
+    lock: str | int | Sequence[str | int] | npt.NDArray[Any] | None = None
     regions: bool = True
     attributes: bool = True
     time_limit: float | None = None

@@ -5,7 +5,7 @@ from __future__ import annotations
 import logging
 import os
 from contextlib import nullcontext
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from functools import partial
 from typing import Any
 
@@ -22,36 +22,26 @@ from anisomesh.caveats import (
     unfollowed_sizes,
 )
 from anisomesh.counts.search import smallest_within
-from anisomesh.cvt.lbfgs import Optimised
-from anisomesh.cvt.schedule import DualFeedback, optimise_sites
-from anisomesh.delaunay.creases import missing_on_creases
-from anisomesh.delaunay.dual import dual_squared_errors
-from anisomesh.delaunay.meshing import MeshingTask, ValidMesh, mesh_from_sites
+from anisomesh.delaunay.meshing import ValidMesh
 from anisomesh.errors import OptionError
 from anisomesh.execution.deadline import Deadline
 from anisomesh.execution.progress import OnStep, StepInfo, ignore_steps
-from anisomesh.execution.run import OPTIMISATION_SHARE, Run
-from anisomesh.features.tagged import distance_to_crease_edges
-from anisomesh.fitting.target import FitTarget
-from anisomesh.fitting.valid import fit_without_faults
-from anisomesh.io.describe import soundness
+from anisomesh.execution.run import Run
 from anisomesh.io.meshes import mesh_of
 from anisomesh.junctions.join import JoinTask, sites_for
 from anisomesh.mesh.surface import Surface
-from anisomesh.mesh.validity import Validity, check_validity
 from anisomesh.metric.conformity import Conformity, MetricExtent, conformity
 from anisomesh.metric.unit_edges import UnitMetric
 from anisomesh.options import MIN_VERTICES, RemeshOptions, read_target, with_overrides
-from anisomesh.resolve import cvt_options, embedding_name
+from anisomesh.resolve import embedding_name
 from anisomesh.result import RemeshResult
-from anisomesh.setup.inputs import PreparedInput, prepared_input, with_split_sides
+from anisomesh.setup.inputs import prepared_input, with_split_sides
+from anisomesh.setup.lock import Cut, cut_locked
 from anisomesh.setup.measured import count_for_length, unit_of_lengths
 from anisomesh.setup.tasks import Tasks, set_up
-from anisomesh.voronoi.restricted import RestrictedVoronoi
+from anisomesh.starts import MeshTask, valid_mesh
 
 logger = logging.getLogger(__name__)
-
-MAX_STARTS = 3  # of the optimisation, with one seed after the other, for a mesh without faults
 
 
 def remesh(
@@ -118,9 +108,8 @@ def remesh(
     n_vertices, ratio, max_error = read_target(n_vertices, ratio, max_error, options)
     with run.stage("load") if isinstance(mesh, str | os.PathLike) else nullcontext():
         given = mesh_of(mesh, faces)
-    with run.stage("prepare"):
-        source = prepared_input(given, options)
-    prepared, remeshed = source.whole, partial(_joined_or_apart, given, source)
+    cut = _cut(given, options, run, joined=options.lock is None)
+    prepared, remeshed = cut.whole.surface, partial(_joined_or_apart, given, cut)
     if max_error is not None:
         options = replace(options, denoise=False)  # the distance asked for refers to the input itself
 
@@ -128,47 +117,56 @@ def remesh(
             run.on_step(StepInfo(stage="search", message=f"{n:,} vertices"))
             return remeshed(n, options, run, nearest=True)
 
-        result = smallest_within(with_vertices, prepared, max_error, deadline)
+        result = smallest_within(with_vertices, prepared, max_error, deadline, least=cut.least)
     elif n_vertices is None and ratio is None:
-        n = count_for_length(source, options, run)
+        n = max(cut.least, cut.n_more + count_for_length(cut.rest, options, run))
         result = remeshed(n, options, run, asked=options.absolute_length)
     else:
         n = n_vertices or max(MIN_VERTICES, round((ratio or 0.0) * prepared.n_points))
         result = remeshed(n, options, run)
-    if n_vertices is None and ratio is None:
+    if cut.is_all:
+        result = replace(result, warnings=cut.remarks)
+    elif n_vertices is None and ratio is None:
         result = replace(result, warnings=(*lengths_beyond(prepared, options, max_error), *result.warnings))
-    return _with_attributes(result, given, options, run) if options.attributes else result
+    return _with_attributes(result, given, cut, options, run) if options.attributes else result
 
 
-def _with_attributes(result: RemeshResult, given: Mesh, options: RemeshOptions, run: Run) -> RemeshResult:
+def _cut(given: Mesh, options: RemeshOptions, run: Run, *, joined: bool) -> Cut:
+    """Return the prepared mesh without what is locked, cut at its junctions if sheets are to be joined there."""
+    with run.stage("prepare"):
+        return cut_locked(prepared_input(given, options, joined=joined), given, options)
+
+
+def _with_attributes(result: RemeshResult, given: Mesh, cut: Cut, options: RemeshOptions, run: Run) -> RemeshResult:
     """Return a result with everything that a mesh carries."""
     if given.is_bare:
         return result
+
+    def oriented(mesh: Mesh) -> Mesh:
+        return oriented_as(mesh, result.prepared) if result.prepare_report.faces_flipped else mesh
+
     with run.stage("attributes"):
-        source = with_split_sides(given, result.prepare_report, options)
-        source = oriented_as(source, result.prepared) if result.prepare_report.faces_flipped else source
+        source = oriented(with_split_sides(given, result.prepare_report, options))
         mesh = transfer_attributes(source, result.surface)
+        if cut.locked.any():
+            mesh = cut.with_exact_attributes(mesh, oriented(given))
     warnings = (*result.warnings, *losses_of_attributes(given, mesh))
     return replace(result, mesh=mesh, seconds=run.total_seconds(), warnings=warnings)
 
 
-def _joined_or_apart(
-    given: Mesh, source: PreparedInput, n: int, options: RemeshOptions, run: Run, **how: Any
-) -> RemeshResult:
+def _joined_or_apart(given: Mesh, cut: Cut, n: int, options: RemeshOptions, run: Run, **how: Any) -> RemeshResult:
     """Remesh a prepared surface with n vertices, its sheets joined at junctions; apart if that does not succeed."""
-    result = _remesh(source, n, options, run, **how)
+    result = _remesh(cut, n, options, run, **how)
     if result is None:
         logger.info("the sheets cannot be joined with %d vertices, and are remeshed apart", n)
-        with run.stage("prepare"):
-            source = prepared_input(given, options, joined=False)
-        result = _remesh(source, n, options, run, **how)
+        result = _remesh(_cut(given, options, run, joined=False), n, options, run, **how)
     if result is None:
         raise AssertionError("a mesh without junctions was not joined")
     return result
 
 
 def _remesh(
-    source: PreparedInput,
+    cut: Cut,
     n: int,
     options: RemeshOptions,
     run: Run,
@@ -176,29 +174,30 @@ def _remesh(
     nearest: bool = False,
     asked: float | None = None,
 ) -> RemeshResult | None:
-    """Remesh a prepared surface with n vertices; None if sheets cannot be joined.
+    """Remesh what is not locked, such that the whole has n vertices; None if sheets cannot be joined.
 
     ``nearest`` if the distance counts more than the shape, and ``asked`` is the length of edges in the metric if that
     was asked for.
     """
-    prepared, junctions = source.prepared, source.junctions
-    n_sites = n if junctions is None else sites_for(junctions, n)
-    tasks = set_up(source, n_sites, options, run, nearest=nearest)
+    source, prepared = cut.rest, cut.whole.prepared
+    n_rest, junctions = cut.count_of_rest(n), source.junctions
+    tasks = set_up(source, n_rest if junctions is None else sites_for(junctions, n_rest), options, run, nearest=nearest)
     measured, task = tasks.measured, tasks.dual
     frame, field = measured.frame, measured.field
     run.check_time()
     order = task.voronoi.embedded.face_order
-    join = None if junctions is None else JoinTask(task, junctions, frame, n)
-    made = _valid_mesh(_MeshTask(task, tasks.fit, join), measured.options, run)
+    join = None if junctions is None else JoinTask(task, junctions, frame, n_rest)
+    made = valid_mesh(MeshTask(task, tasks.fit, join), measured.options, run)
     if made is None:
         return None
-    mesh, optimised, validity = made.mesh, made.optimised, made.validity
+    mesh, optimised = made.mesh, made.optimised
     agreement = _agreement(mesh, tasks, asked) if asked or task.error_weights is not None else None
-    surface = Surface(frame.to_model(mesh.points), mesh.faces)
+    rest, reference = (Surface(source.to_model(each.points, frame), each.faces) for each in (mesh, measured.surface))
+    surface, validity = cut.checked(rest, reference, made.validity, run.deadline)
     return RemeshResult(
         surface=surface,
         mesh=Mesh(surface=surface),
-        prepared=source.whole,
+        prepared=cut.whole.surface,
         prepare_report=prepared.report,
         working=task.voronoi.embedded.surface,
         tensors=field.tensors,
@@ -219,6 +218,7 @@ def _remesh(
         seconds=run.total_seconds(),
         warnings=(
             *losses_of_repair(prepared.report, joined=junctions is not None),
+            *cut.remarks,
             *measured.remarks,
             *field.remarks,
             *losses_of_shape(
@@ -228,7 +228,7 @@ def _remesh(
                 made.feature_distance,
                 measured.followed,
             ),
-            *caveats(n, field.noise, mesh, validity, optimised, measured.options),
+            *caveats(n, field.noise, replace(mesh, points=surface.points), validity, optimised, measured.options),
             *(() if agreement is None else unfollowed_sizes(agreement)),
         ),
         conformity=agreement,
@@ -250,88 +250,4 @@ def _agreement(mesh: ValidMesh, tasks: Tasks, asked: float | None) -> Conformity
         MetricExtent.of(tasks.metric.surface.surface, tasks.metric.field),
         asked=asked,
         unit=unit_of_lengths(tasks.measured.options, tasks.measured.frame),
-    )
-
-
-@dataclass(frozen=True, eq=False)
-class _MeshTask:
-    """How a mesh is made from sites, what it is fitted to, and how its sheets are joined; None if that is not done."""
-
-    dual: MeshingTask
-    fit: FitTarget | None
-    join: JoinTask | None
-
-
-@dataclass(frozen=True, kw_only=True, eq=False)
-class _Made:
-    """A mesh, its distance from prescribed edges, the sites it was made from, and the seed of their start."""
-
-    mesh: ValidMesh
-    optimised: Optimised
-    validity: Validity
-    feature_distance: float
-    seed: int
-
-    @property
-    def faults(self) -> int:
-        """Faults that another start may avoid."""
-        return self.validity.inverted + self.validity.new_intersections + self.validity.flat
-
-
-def _valid_mesh(task: _MeshTask, options: RemeshOptions, run: Run) -> _Made | None:
-    """Return the mesh of a task; from the next seeds while it has faults that the input does not explain.
-
-    None if its sheets cannot be joined.
-    """
-    best = made = _mesh_of_start(task, options, run)
-    for seed in range(options.seed + 1, options.seed + MAX_STARTS):
-        if best is None or made is None or not best.faults or run.deadline.passed():
-            break
-        if made.validity.self_intersections_input > 0 or made.mesh.from_input:
-            break
-        fresh = replace(task.dual, voronoi=RestrictedVoronoi(task.dual.voronoi.embedded, threads=options.threads))
-        made = _mesh_of_start(replace(task, dual=fresh), replace(options, seed=seed), run)
-        if made is not None and made.faults < best.faults:
-            best = made
-    return best
-
-
-def _mesh_of_start(start: _MeshTask, options: RemeshOptions, run: Run) -> _Made | None:
-    """Return the mesh of a task from the sites that start from the seed of the options; None if it cannot be joined."""
-    task, target, join = start.dual, start.fit, start.join
-    with run.stage("cvt"):
-        optimised = optimise_sites(
-            task.voronoi,
-            task.n_vertices,
-            task.features,
-            cvt_options(options, sized=task.error_weights is not None),
-            feedback=DualFeedback(partial(dual_squared_errors, weights=task.error_weights), missing_on_creases),
-            on_step=run.on_step,
-            deadline=run.deadline.share(OPTIMISATION_SHARE),
-        )
-    with run.stage("dual"):
-        mesh = mesh_from_sites(task, optimised.sites)
-        conforming = None if join is None else join.conforming(mesh)
-        if conforming is not None:
-            mesh = conforming.mesh
-        elif join is not None:
-            return None
-    with run.stage("fit"):
-        surface = Surface(mesh.points, mesh.faces)
-        feature_distance = distance_to_crease_edges(
-            task.voronoi.embedded.surface, task.features.required, surface, mesh.crease_edges
-        )
-        if target is not None:
-            surface = fit_without_faults(surface, target, crease_edges=mesh.crease_edges, deadline=run.deadline)
-            mesh = replace(mesh, points=surface.points, faces=surface.faces, crease_edges=mesh.crease_edges[:0])
-        if conforming is not None and join is not None:
-            joined = join.joined(conforming.after(surface))
-            if joined is None:
-                return None
-            mesh, surface = replace(mesh, points=joined.points, faces=joined.faces), joined
-        validity = check_validity(surface, task.surface, None if join is None else join.junctions.whole)
-    facts = options.seed, optimised.iterations, optimised.status, soundness(validity)
-    logger.info("seed %d: %d iterations, %s; mesh: %s", *facts)
-    return _Made(
-        mesh=mesh, optimised=optimised, validity=validity, feature_distance=feature_distance, seed=options.seed
     )

@@ -41,8 +41,8 @@ class RemeshResult:
     prepare_report
         What the repair did, as counts.
     working
-        The surface that was embedded: the prepared input at bounding-box diagonal 1, slivers and long edges
-        triangulated anew, noise removed. Its triangles may differ from the triangles of ``prepared``.
+        The surface that was embedded: the prepared input at bounding-box diagonal 1, without locked faces, slivers and
+        long edges triangulated anew, noise removed. Its triangles may differ from the triangles of ``prepared``.
     metric
         The metric in model units, in which edges have the length 1; see :attr:`unit_tensors`.
     tensors

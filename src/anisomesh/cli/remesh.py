@@ -70,6 +70,19 @@ def command(
         Path | None,
         _input(metavar="FILE", help="Edges to keep: a text file, two vertex numbers of IN per line, from 0."),
     ] = None,
+    keep_points: Annotated[
+        Path | None,
+        _input(
+            metavar="FILE", help="Vertices to keep where they are: a text file, a vertex number of IN per line, from 0."
+        ),
+    ] = None,
+    lock: Annotated[
+        list[str] | None,
+        _input(
+            metavar="REGION",
+            help="Leave the triangles of this region of IN as they are, by its name or label; may be repeated.",
+        ),
+    ] = None,
     density: Annotated[
         Path | None,
         _input(
@@ -133,13 +146,15 @@ def command(
         raise typer.BadParameter("-o - and --json both write to standard output; use --report FILE")
     weights = options.get("weights")
     check_input_format(source, input_format)
-    others = features, density, None if weights is None else Path(weights), path_of(metric_file)
+    others = features, density, keep_points, None if weights is None else Path(weights), path_of(metric_file)
     outputs.check(None if source == STANDARD_STREAM else source, *others)
-    if features is not None or density is not None:
-        from anisomesh.io.text_tables import load_numbers, load_pairs
+    files = {"features": features, "keep_points": keep_points, "density": density}
+    if any(path is not None for path in files.values()):
+        from anisomesh.io.text_tables import load_numbers, load_pairs, load_points
 
-        options["features"] = None if features is None else load_pairs(features)
-        options["density"] = None if density is None else load_numbers(density)
+        readers = {"features": load_pairs, "keep_points": load_points, "density": load_numbers}
+        options |= {name: readers[name](path) for name, path in files.items() if path is not None}
+    options["lock"] = lock or None
     prescribed = None if metric_file is None else MetricFile.read(metric_file)
     with progress(quiet) as display:
         mesh, seconds = read_mesh(source, input_format)
@@ -154,10 +169,7 @@ def command(
             options |= prescribed.options_for(mesh.surface, str(source))
         result, facts = run_remesh(mesh, display, name=str(source), load_seconds=seconds, **options)
         facts["hints"] = hints(result.prepared)
-        facts["options"] |= {
-            "features": None if features is None else str(features),
-            "density": None if density is None else str(density),
-        }
+        facts["options"] |= {name: None if path is None else str(path) for name, path in files.items()}
         if prescribed is not None:
             facts["options"] |= {"metric": None, "size_field": None, "metric_file": metric_file}
         outputs.write(result, facts, display)

@@ -32,7 +32,12 @@ class Counts:
 
 
 def smallest_within(
-    remesh: Callable[[int], RemeshResult], surface: Surface, max_error: float, deadline: Deadline
+    remesh: Callable[[int], RemeshResult],
+    surface: Surface,
+    max_error: float,
+    deadline: Deadline,
+    *,
+    least: int = MIN_VERTICES,
 ) -> RemeshResult:
     """Return the smallest remesh found with a distance to the surface, both ways, of at most ``max_error``.
 
@@ -48,6 +53,8 @@ def smallest_within(
         Largest distance, in the units of the surface.
     deadline
         The search ends when it has passed, if a sufficient result is known.
+    least
+        The smallest number that is allowed.
 
     Raises
     ------
@@ -68,8 +75,8 @@ def smallest_within(
         return max(error, lost)
 
     counts = Counts(
-        first=max(MIN_VERTICES, round(FIRST_RATIO * surface.n_points)),
-        least=MIN_VERTICES,
+        first=max(least, round(FIRST_RATIO * surface.n_points)),
+        least=least,
         most=MAX_RATIO * surface.n_points + MAX_MORE,
         milestone=surface.n_points,
     )

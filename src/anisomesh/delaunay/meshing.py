@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from functools import cached_property
 
 import numpy as np
@@ -19,9 +19,12 @@ from anisomesh.features.network import FeatureNetwork
 from anisomesh.mesh.closest_points import ClosestPoints
 from anisomesh.mesh.surface import Surface
 from anisomesh.mesh.validity import faulty_faces
+from anisomesh.meshops.anchoring.anchored import anchored
+from anisomesh.meshops.anchors import Anchors
 from anisomesh.meshops.decimation import decimate, ends_of_creases
 from anisomesh.meshops.edge_recovery import recover_edges
 from anisomesh.meshops.flip import flip_for_shape
+from anisomesh.meshops.held import Held, at_places
 from anisomesh.meshops.inverted import remove_inverted_triangles
 from anisomesh.meshops.self_intersections import remove_self_intersections
 from anisomesh.meshops.split import split_longest_edges
@@ -59,6 +62,8 @@ class MeshingTask:
         When to stop repairing faults.
     error_weights
         Weights (V,) of squared distances, by which points that the dual misses are found; None for 1 everywhere.
+    anchors
+        Where the mesh has vertices, and edges of its boundary, in any case.
     """
 
     voronoi: RestrictedVoronoi
@@ -68,6 +73,7 @@ class MeshingTask:
     n_vertices: int
     deadline: Deadline = NO_DEADLINE
     error_weights: PointScalars | None = None
+    anchors: Anchors = field(default_factory=Anchors)
 
     @cached_property
     def reference(self) -> ClosestPoints:
@@ -137,7 +143,8 @@ def mesh_from_sites(task: MeshingTask, sites: Sites) -> ValidMesh:
        and, within a limit, to corners and long intervals of creases without a cell. Nothing else moves.
     2. When all cells are disks with at most one boundary interval the dual is homeomorphic to the surface. Points on
        edges that occur twice make the delta complex a simplicial mesh.
-    3. Flips recover edges between vertices that follow each other on a crease.
+    3. Flips recover edges between vertices that follow each other on a crease. Vertices move to anchors, or are added
+       there, and the outline becomes the boundary; no later step moves or removes these.
     4. Surplus points are removed by edge collapses with the link condition, cheapest first. Where creases fix more than
        a share of the vertices asked for, collapses do not follow them: they would remove all points beside the creases.
     5. Inverted triangles are repaired by flips, moves, collapses and splits.
@@ -179,14 +186,16 @@ def _attempt(task: MeshingTask, sites: Sites, n_start: int) -> ValidMesh:
     """Return the mesh of these sites, of which the first were optimised: steps 1 to 7 of :func:`mesh_from_sites`."""
     controlled = control_topology(task.voronoi, sites, task.features, task.n_vertices)
     dual = _dual_in_space(task, controlled)
-    mesh = dual if dual is not None else FeatureMesh.of(task.surface)
+    mesh = (
+        dual if dual is not None else _with_anchors(task, FeatureMesh.of(task.surface)) or FeatureMesh.of(task.surface)
+    )
     n_first = len(mesh.points)
     mesh = _coarsened(task, _without_inverted(task, mesh))
     roots = transfer_metric_roots(task.embedded_reference, task.roots, mesh.points)
     points = mesh.points
     faces = flip_for_shape(points, mesh.faces, roots, task.reference, kept=mesh.crease_edges)
     if len(points) < task.n_vertices:
-        kept = mesh.crease_edges
+        kept = np.concatenate([mesh.crease_edges, task.anchors.outline_in(Surface(points, faces))])
         points, faces = split_longest_edges(points, faces, task.n_vertices, task.reference, roots, kept=kept)
     none = np.zeros(len(points), dtype=bool)
     tries = _MAX_TRIES if dual is not None else _MAX_TRIES_COARSENED
@@ -203,7 +212,7 @@ def _attempt(task: MeshingTask, sites: Sites, n_start: int) -> ValidMesh:
 
 
 def _dual_in_space(task: MeshingTask, controlled: ControlledCells) -> FeatureMesh | None:
-    """Return the dual in space with its crease edges, steps 2 and 3; None if it is not homeomorphic to the surface."""
+    """Return the dual in space, steps 2 and 3; None if it is not homeomorphic to the surface or cannot be anchored."""
     if not controlled.complete:
         return None
     cells, creased = controlled.cells, controlled.creased
@@ -215,12 +224,23 @@ def _dual_in_space(task: MeshingTask, controlled: ControlledCells) -> FeatureMes
     links = edges_left(faces, creased.links)
     locked = np.zeros(len(space), dtype=bool)
     locked[creased.cell[creased.corner][: int(MAX_LOCKED_SHARE * task.n_vertices)]] = True
-    return FeatureMesh(space, faces, links, locked)
+    return _with_anchors(task, FeatureMesh(space, faces, links, locked))
+
+
+def _with_anchors(task: MeshingTask, mesh: FeatureMesh) -> FeatureMesh | None:
+    """Return the mesh with the anchors of the task, which are locked, and their outline; None if that fails."""
+    found = anchored(mesh.points, mesh.faces, mesh.crease_edges, task.anchors, task.reference)
+    if found is None:
+        return None
+    locked = at_places(found[0], mesh.points[mesh.locked]) | task.anchors.held_in(found[0])
+    return FeatureMesh(*found, locked)
 
 
 def _without_inverted(task: MeshingTask, mesh: FeatureMesh) -> FeatureMesh:
     """Return the mesh with inverted triangles repaired, and the crease edges and locked points that have not moved."""
-    points, faces, _ = remove_inverted_triangles(mesh.points, mesh.faces, task.reference, deadline=task.deadline)
+    points, faces, _ = remove_inverted_triangles(
+        mesh.points, mesh.faces, task.reference, held=Held(task.anchors.places), deadline=task.deadline
+    )
     if points is mesh.points:
         return FeatureMesh(points, faces, mesh.crease_edges, mesh.locked)
     number = renumbered(mesh.points, points)
@@ -236,11 +256,14 @@ def _coarsened(task: MeshingTask, mesh: FeatureMesh) -> FeatureMesh:
         return mesh
     n, reference = task.n_vertices, task.reference
     surface, creases = Surface(mesh.points, mesh.faces), mesh.crease_edges
-    if np.count_nonzero(mesh.locked | ends_of_creases(creases, surface.n_points)) <= MAX_FIXED_SHARE * n:
+    anchored = task.anchors.held_in(mesh.points)
+    fixed = (mesh.locked | ends_of_creases(creases, surface.n_points)) & ~anchored
+    if np.count_nonzero(fixed) <= MAX_FIXED_SHARE * (n - np.count_nonzero(anchored)):
         coarser = decimate(surface, n, held=mesh.locked, crease_edges=creases, moves=False, reference=reference)
         surface, creases = coarser.surface, coarser.crease_edges
     if surface.n_points > n:  # fewer than the creases need
-        coarser = decimate(surface, n, moves=False, reference=reference)
+        anchored = task.anchors.held_in(surface.points)
+        coarser = decimate(surface, n, held=anchored, moves=False, reference=reference)
         surface, creases = coarser.surface, coarser.crease_edges
     none = np.zeros(surface.n_points, dtype=bool)
     return _without_inverted(task, FeatureMesh(surface.points, surface.faces, creases, none))
@@ -248,23 +271,24 @@ def _coarsened(task: MeshingTask, mesh: FeatureMesh) -> FeatureMesh:
 
 def _without_crossings(task: MeshingTask, mesh: FeatureMesh, tries: int) -> tuple[Points, Faces, EdgeEnds]:
     """Return the mesh and its crease edges, without new self-intersections and with no more points where possible."""
-    reference, n_wanted = task.reference, max(task.n_vertices, len(mesh.points))
+    reference, n_wanted, held = task.reference, max(task.n_vertices, len(mesh.points)), task.anchors.places
     points, faces, crossing = remove_self_intersections(
-        mesh.points, mesh.faces, reference, max_tries=tries, deadline=task.deadline
+        mesh.points, mesh.faces, reference, held=Held(held), max_tries=tries, deadline=task.deadline
     )
     creases = edges_left(faces, renumbered(mesh.points, points)[mesh.crease_edges])
     for _ in range(_MAX_TRIMS):
         if len(points) <= n_wanted:
             break
-        added = np.arange(len(points)) >= n_wanted
+        stays = (np.arange(len(points)) >= n_wanted) | at_places(points, held)
         trimmed = decimate(
-            Surface(points, faces), n_wanted, held=added, crease_edges=creases, moves=False, reference=reference
+            Surface(points, faces), n_wanted, held=stays, crease_edges=creases, moves=False, reference=reference
         )
+        found = trimmed.surface
         coarser = remove_self_intersections(
-            trimmed.surface.points, trimmed.surface.faces, reference, max_tries=_TRIM_TRIES, deadline=task.deadline
+            found.points, found.faces, reference, held=Held(held), max_tries=_TRIM_TRIES, deadline=task.deadline
         )
         if coarser[2] > crossing:
             break
         points, faces, crossing = coarser
-        creases = edges_left(faces, renumbered(trimmed.surface.points, points)[trimmed.crease_edges])
+        creases = edges_left(faces, renumbered(found.points, points)[trimmed.crease_edges])
     return points, faces, creases

@@ -9,7 +9,7 @@ import numpy as np
 import numpy.typing as npt
 from scipy.spatial import cKDTree
 
-from anisomesh._arrays import EdgeMask, PointMask
+from anisomesh._arrays import EdgeMask
 from anisomesh.errors import OptionError
 from anisomesh.mesh.surface import Surface
 from anisomesh.mesh.topology import edge_keys
@@ -48,7 +48,7 @@ def tagged_edges(
     ends = _checked_pairs(input_mesh, pairs)
     tree = cKDTree(prepared.points)
     keys = edge_keys(prepared.edges)
-    radius = _search_radius(input_mesh, tolerance)
+    radius = search_radius(input_mesh, tolerance)
     copies = [tree.query_ball_point(input_mesh.points[column], radius) for column in ends.T]
     wanted = [
         (a, b, k)
@@ -84,20 +84,8 @@ def _along(surface: Surface, lines: npt.NDArray[np.float64], limit: float) -> Ed
     return found
 
 
-def tagged_points(
-    input_mesh: Surface, points: npt.NDArray[np.int64], prepared: Surface, tolerance: float | Literal["auto"]
-) -> PointMask:
-    """Return which points (V,) of the prepared surface are at points (n,) of the input mesh.
-
-    The other parameters are the ones of :func:`tagged_edges`.
-    """
-    found = np.zeros(prepared.n_points, dtype=bool)
-    distance, nearest = cKDTree(prepared.points).query(input_mesh.points[points])
-    found[nearest[distance <= _search_radius(input_mesh, tolerance)]] = True
-    return found
-
-
-def _search_radius(input_mesh: Surface, tolerance: float | Literal["auto"]) -> float:
+def search_radius(input_mesh: Surface, tolerance: float | Literal["auto"]) -> float:
+    """Return the distance up to which a point of the prepared surface is a point of the input, in model units."""
     return max(weld_distance(input_mesh, tolerance), _MIN_SEARCH_RADIUS * input_mesh.diagonal)
 
 

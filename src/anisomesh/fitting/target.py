@@ -16,6 +16,7 @@ from anisomesh.fitting.samples import SurfaceSamples, sample_surface
 from anisomesh.mesh.closest_points import ClosestPoints
 from anisomesh.mesh.surface import Surface
 from anisomesh.mesh.topology import edge_keys
+from anisomesh.meshops.anchors import Anchors
 from anisomesh.metric.transfer import PlacedMetric
 
 _SAME_PLACE = 1e-9  # at bounding-box diagonal 1
@@ -42,6 +43,8 @@ class FitTarget:
         Edges that bend by more degrees are creases, along which points only slide; 180 for none.
     plan
         How meshes are fitted.
+    anchors
+        Where a mesh has vertices, and edges of its boundary, that stay.
     """
 
     reference: ClosestPoints
@@ -51,6 +54,7 @@ class FitTarget:
     lines: EdgeEnds = field(default_factory=lambda: np.zeros((0, 2), dtype=np.int64))
     crease_angle: float = 40.0
     plan: FitPlan = field(default_factory=FitPlan)
+    anchors: Anchors = field(default_factory=Anchors)
 
     @classmethod
     def of(
@@ -102,7 +106,7 @@ class FitTarget:
 
     def task(self, mesh: Surface, crease_edges: EdgeEnds) -> FitTask:
         """Return the task to fit a mesh with these edges (n, 2) along creases."""
-        held = self.at_corners(mesh.points)
+        held = self.at_corners(mesh.points) | self.anchors.held_in(mesh.points)
         stays = crease_edges if self.holds_creases else self._on_lines(mesh, crease_edges)
         held[stays] = True
         kept = np.isin(edge_keys(mesh.edges), edge_keys(stays))

@@ -11,12 +11,11 @@ from anisomesh.execution.deadline import NO_DEADLINE, Deadline
 from anisomesh.fitting.arrays import FitTask
 from anisomesh.fitting.fit import FitOptions, fit_mesh
 from anisomesh.fitting.target import FitTarget
-from anisomesh.mesh.closest_points import ClosestPoints
 from anisomesh.mesh.surface import Surface
 from anisomesh.mesh.topology import with_neighbours
 from anisomesh.mesh.validity import faulty_faces
 from anisomesh.meshops.decimation import decimate
-from anisomesh.meshops.held import points_near_faces
+from anisomesh.meshops.held import Held, points_near_faces
 from anisomesh.meshops.inverted import remove_inverted_triangles
 from anisomesh.meshops.self_intersections import remove_self_intersections
 
@@ -64,10 +63,10 @@ def fit_without_faults(
 def _decimated(target: FitTarget, n_points: int) -> FitTask | None:
     """Return the task to fit the surface decimated to this many points, None if that is not possible."""
     surface = target.reference.surface
-    held = target.at_corners(surface.points)
-    if np.count_nonzero(held) > _MAX_HELD * n_points:
+    held, anchored = target.at_corners(surface.points), target.anchors.held_in(surface.points)
+    if np.count_nonzero(held & ~anchored) > _MAX_HELD * (n_points - np.count_nonzero(anchored)):
         held[:] = False
-    start = decimate(surface, n_points, held=held, crease_edges=target.lines)
+    start = decimate(surface, n_points, held=held | anchored, crease_edges=target.lines)
     return target.task(start.surface, start.crease_edges) if start.surface.n_points == n_points else None
 
 
@@ -80,7 +79,7 @@ def _fitted(
         fitted = fit_mesh(task, target.samples, how, threads=target.plan.threads, deadline=deadline)
         faulty = faulty_faces(fitted, target.reference)
         if max_faults < len(faulty) <= _MAX_REPAIRS and not task.kept.any():
-            fitted = _repaired(fitted, target.reference, deadline)
+            fitted = _repaired(fitted, target, deadline)
             faulty = faulty_faces(fitted, target.reference)
         if len(faulty) <= max_faults:
             return fitted
@@ -91,8 +90,11 @@ def _fitted(
     return None
 
 
-def _repaired(mesh: Surface, reference: ClosestPoints, deadline: Deadline) -> Surface:
+def _repaired(mesh: Surface, target: FitTarget, deadline: Deadline) -> Surface:
     """Return a mesh with faults removed by local changes, itself if that takes more points."""
-    points, faces, _ = remove_inverted_triangles(mesh.points, mesh.faces, reference, deadline=deadline)
-    points, faces, _ = remove_self_intersections(points, faces, reference, max_tries=_MAX_REPAIRS, deadline=deadline)
+    reference, held = target.reference, Held(target.anchors.places)
+    points, faces, _ = remove_inverted_triangles(mesh.points, mesh.faces, reference, held=held, deadline=deadline)
+    points, faces, _ = remove_self_intersections(
+        points, faces, reference, held=held, max_tries=_MAX_REPAIRS, deadline=deadline
+    )
     return Surface(points, faces) if len(points) == mesh.n_points else mesh

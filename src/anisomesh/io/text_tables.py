@@ -24,12 +24,18 @@ def load_pairs(path: str | os.PathLike[str]) -> npt.NDArray[np.int64]:
     MeshFileError
         If the file cannot be read, or a line has other content.
     """
-    pairs = []
-    for where, words in _lines(path, "two vertex numbers per line"):
-        if len(words) != 2 or not all(word.isdecimal() and len(word) < _MAX_DIGITS for word in words):
-            raise MeshFileError(f"{where}: {' '.join(words)[:_SHOWN]!r}; expected two vertex numbers, from 0")
-        pairs.append([int(word) for word in words])
-    return np.array(pairs, dtype=np.int64).reshape(-1, 2)
+    return _vertex_numbers(path, 2, "two vertex numbers")
+
+
+def load_points(path: str | os.PathLike[str]) -> npt.NDArray[np.int64]:
+    """Return the point indices (n,) in a text file: an integer per line, from 0.
+
+    Raises
+    ------
+    MeshFileError
+        If the file cannot be read, or a line has other content.
+    """
+    return _vertex_numbers(path, 1, "one vertex number").ravel()
 
 
 def load_numbers(path: str | os.PathLike[str]) -> npt.NDArray[np.float64]:
@@ -46,6 +52,16 @@ def load_numbers(path: str | os.PathLike[str]) -> npt.NDArray[np.float64]:
             raise MeshFileError(f"{where}: {' '.join(words)[:_SHOWN]!r}; expected one finite number")
         numbers.append(float(words[0]))
     return np.array(numbers, dtype=np.float64)
+
+
+def _vertex_numbers(path: str | os.PathLike[str], width: int, expected: str) -> npt.NDArray[np.int64]:
+    """Return the numbers in a text file (n, width), or an error for a line of other content than ``expected``."""
+    rows = []
+    for where, words in _lines(path, f"{expected} per line"):
+        if len(words) != width or not all(word.isdecimal() and len(word) < _MAX_DIGITS for word in words):
+            raise MeshFileError(f"{where}: {' '.join(words)[:_SHOWN]!r}; expected {expected}, from 0")
+        rows.append([int(word) for word in words])
+    return np.array(rows, dtype=np.int64).reshape(-1, width)
 
 
 def _lines(path: str | os.PathLike[str], expected: str) -> Iterator[tuple[str, list[str]]]:

@@ -7,7 +7,7 @@ from functools import cached_property
 
 import numpy as np
 
-from anisomesh._arrays import EdgeMask, PointLabels
+from anisomesh._arrays import EdgeMask, PointLabels, PointMask
 from anisomesh.junctions.graph import JunctionGraph, graph_of
 from anisomesh.mesh.surface import Surface
 from anisomesh.mesh.topology import corner_fans, edge_keys, edges_of, side_pairs
@@ -28,6 +28,8 @@ class Junctions:
     source
         For every point of the sheets (V,) a point of the prepared surface: itself, or an end of the edge in the middle
         of which it was added.
+    added
+        Which points of the sheets (V,) were added.
     joined
         For every point of the sheets (V,) its number when the sheets are joined: the points that a point of a junction
         was cut into have the same one.
@@ -37,8 +39,14 @@ class Junctions:
 
     sheets: Surface
     source: PointLabels
+    added: PointMask
     joined: PointLabels
     graph: JunctionGraph
+
+    @cached_property
+    def on_several(self) -> PointMask:
+        """Which points of the sheets (V,) are one with others when they are joined."""
+        return np.asarray(np.bincount(self.joined)[self.joined] > 1)
 
     @cached_property
     def whole(self) -> Surface:
@@ -47,8 +55,15 @@ class Junctions:
         return Surface(self.sheets.points[first], self.joined[self.sheets.faces])
 
 
-def cut_at_junctions(prepared: Prepared) -> Junctions | None:
+def cut_at_junctions(prepared: Prepared, fixed: PointMask | None = None) -> Junctions | None:
     """Return the sheets of a prepared surface, None if no edge of it was cut apart.
+
+    Parameters
+    ----------
+    prepared
+        The prepared surface.
+    fixed
+        Points (V,) that are nodes if they are on junctions.
 
     Notes
     -----
@@ -79,8 +94,14 @@ def cut_at_junctions(prepared: Prepared) -> Junctions | None:
     sheets = Surface(surface.points[copied[order]], position[corner_point].reshape(-1, 3))
     labels = joined[copied[order]]
     keys = np.unique(edge_keys(joined[surface.edges[junction]]))
-    graph = graph_of(sheets, labels, keys, turns_are_corners=is_designed(prepared.surface))
-    return Junctions(sheets=sheets, source=source[copied[order]].astype(np.int32), joined=labels, graph=graph)
+    nodes = np.zeros(int(joined.max()) + 1, dtype=bool)
+    if fixed is not None:
+        nodes[joined[: len(fixed)][fixed]] = True
+    graph = graph_of(sheets, labels, keys, nodes, turns_are_corners=is_designed(prepared.surface))
+    added = copied[order] >= prepared.surface.n_points
+    return Junctions(
+        sheets=sheets, source=source[copied[order]].astype(np.int32), added=added, joined=labels, graph=graph
+    )
 
 
 def _joined(surface: Surface, junction: EdgeMask) -> PointLabels:

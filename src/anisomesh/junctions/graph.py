@@ -77,7 +77,9 @@ class JunctionGraph:
     loops: tuple[Loop, ...]
 
 
-def graph_of(sheets: Surface, joined: PointLabels, keys: Ints, *, turns_are_corners: bool) -> JunctionGraph:
+def graph_of(
+    sheets: Surface, joined: PointLabels, keys: Ints, nodes: PointMask, *, turns_are_corners: bool
+) -> JunctionGraph:
     """Return the junction graph of sheets.
 
     Parameters
@@ -88,11 +90,15 @@ def graph_of(sheets: Surface, joined: PointLabels, keys: Ints, *, turns_are_corn
         The number of each of their points (V,) when they are joined.
     keys
         Keys (n,) of the junction edges between joined points, ascending.
+    nodes
+        Joined points that are nodes if curves go through them.
     turns_are_corners
         Whether a curve ends where it turns by 45 degrees or more.
     """
     loops = [loop.astype(np.int64) for loop in boundary_loops(sheets.faces)]
     is_node = _ends_and_meetings(sheets, joined, keys, loops, turns_are_corners=turns_are_corners)
+    on_curves = np.unique(np.stack([keys >> 32, keys & 0xFFFFFFFF]))
+    is_node[on_curves] |= nodes[on_curves]
     curves = _curves(keys, is_node)
     place = {int(key): (number, k) for number, curve in enumerate(curves) for k, key in enumerate(_keys_along(curve))}
     found = tuple(_loop(points, joined, is_node, place, curves) for points in loops)

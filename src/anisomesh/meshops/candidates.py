@@ -60,11 +60,11 @@ def nudges(patch: Patch) -> Iterator[Change]:
 
 
 def collapses(patch: Patch) -> Iterator[Change]:
-    """Yield the collapses of the edges of the fault that take away a point off the boundary."""
+    """Yield the collapses of the edges of the fault that take away a point that need not stay."""
     surface = patch.surface
     edges = patch.fault_edges[collapsible_edges(surface)[patch.fault_edges]]
     for gone, into in np.concatenate([surface.edges[edges], surface.edges[edges][:, ::-1]]).tolist():
-        if not surface.on_boundary[gone]:
+        if not patch.stays[gone]:
             star = patch.star(gone)
             faces = surface.faces[star].astype(np.int64)
             yield Change(star, np.where(faces == gone, into, faces)[(faces != into).all(axis=1)])
@@ -100,16 +100,16 @@ def edge_splits(patch: Patch) -> Iterator[Change]:
 
 
 def smoothing(patch: Patch) -> Iterator[Change]:
-    """Yield moves of all points off the boundary: one to ten sweeps of smoothing on the surface."""
+    """Yield moves of all points that need not stay: one to ten sweeps of smoothing on the surface."""
     surface = patch.surface
-    inner = np.flatnonzero(~surface.on_boundary)
+    inner = np.flatnonzero(~patch.stays)
     if len(inner) == 0:
         return
     ends = np.concatenate([surface.edges, surface.edges[:, ::-1]])
     matrix = np.zeros((surface.n_points, surface.n_points))
     matrix[ends[:, 0], ends[:, 1]] = 1.0
     matrix = matrix[inner] / matrix[inner].sum(axis=1, keepdims=True)
-    gone = np.flatnonzero(~surface.on_boundary[surface.faces].all(axis=1))
+    gone = np.flatnonzero(~patch.stays[surface.faces].all(axis=1))
     points = surface.points.copy()
     for _ in range(_SMOOTHING_SWEEPS):
         points[inner] = on_surface(patch, matrix @ points)

@@ -9,7 +9,7 @@ from functools import cached_property
 import numpy as np
 import numpy.typing as npt
 
-from anisomesh._arrays import FaceMask, Faces, Points
+from anisomesh._arrays import FaceMask, Faces, PointMask, Points
 from anisomesh.mesh.closest_points import ClosestPoints
 from anisomesh.mesh.intersections import Pairs, self_intersections
 from anisomesh.mesh.surface import Surface
@@ -74,6 +74,8 @@ class Patch:
         Which faces (F,) have a fault, this or another one.
     reference
         The surface that the mesh approximates.
+    stays
+        Which points (V,) neither move nor go: the ones on the boundary of the part, and held ones.
     """
 
     surface: Surface
@@ -82,18 +84,23 @@ class Patch:
     faces: Ints
     faulty: FaceMask
     reference: ClosestPoints
+    stays: PointMask
 
     @classmethod
-    def cut(cls, surface: Surface, faces: Ints, fault: Ints, faulty: FaceMask, reference: ClosestPoints) -> Patch:
-        """Return the patch of some faces (F,), in ascending order, around a fault (k,)."""
+    def cut(
+        cls, surface: Surface, faces: Ints, fault: Ints, faulty: FaceMask, reference: ClosestPoints, held: PointMask
+    ) -> Patch:
+        """Return the patch of some faces (F,), in ascending order, around a fault (k,); ``held`` points stay."""
         points, corners = np.unique(surface.faces[faces], return_inverse=True)
         part = Surface(surface.points[points], corners.reshape(-1, 3))
-        return cls(part, np.searchsorted(faces, fault), points, faces, faulty, reference)
+        stays = part.on_boundary | held[points]
+        return cls(part, np.searchsorted(faces, fault), points, faces, faulty, reference, stays)
 
     @property
     def key(self) -> bytes:
-        """What tells the patch from all others that differ in shape, connectivity or fault."""
-        return b"".join(array.tobytes() for array in (self.surface.points, self.surface.faces, self.fault))
+        """What tells the patch from all others that differ in shape, connectivity, fault or points that stay."""
+        arrays = self.surface.points, self.surface.faces, self.fault, self.stays
+        return b"".join(array.tobytes() for array in arrays)
 
     @cached_property
     def corners(self) -> Floats:
@@ -117,9 +124,9 @@ class Patch:
 
     @property
     def movable(self) -> list[int]:
-        """Corners of the faulty faces that may move: those off the boundary."""
+        """Corners of the faulty faces that may move."""
         corners = np.unique(self.surface.faces[self.fault])
-        return [int(corner) for corner in corners[~self.surface.on_boundary[corners]]]
+        return [int(corner) for corner in corners[~self.stays[corners]]]
 
     def star(self, point: int) -> Ints:
         """Return the faces (n,) at a point."""

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import dataclass, field
+from functools import partial
 from typing import Protocol
 
 import numpy as np
@@ -14,6 +15,7 @@ from anisomesh.mesh import geometry
 from anisomesh.mesh.closest_points import ClosestPoints
 from anisomesh.mesh.surface import Surface
 from anisomesh.meshops.change import Change, Ints, Patch, apply_changes
+from anisomesh.meshops.held import Held, at_places
 
 _FACES_PER_TRY = 100  # a patch of more faces counts for several tries
 _MAX_PATCH = 2_000  # faces of a patch; in a larger one the mesh is crumpled, and every try takes long
@@ -58,6 +60,8 @@ class Strategy:
         Rounds in all, and rounds that leave as many faults.
     max_tries
         Patches looked at in all rounds together, large ones counted as several.
+    held
+        Points and faces that stay.
     """
 
     candidates: Sequence[Candidates]
@@ -65,6 +69,7 @@ class Strategy:
     max_rounds: int
     max_plateaus: int
     max_tries: float = np.inf
+    held: Held = field(default_factory=Held)
 
 
 def remove_faults(
@@ -101,8 +106,8 @@ def remove_faults(
     In each round every fault gets the change that leaves the fewest faults on the patch around it, if those are fewer
     than before: from the first source of candidates that has one. Changes of one round have disjoint patches. Where
     no fault can be helped the round makes changes that leave as many faults; the number of these rounds is bounded.
-    A change is made only if it keeps the topology and the boundary and makes no triangle inverted or thin. Patches
-    that nothing helped are remembered, and looked at again when something on them has changed.
+    A change is made only if it keeps the topology, the boundary and what is held, and makes no triangle inverted or
+    thin. Patches that nothing helped are remembered, and looked at again when something on them has changed.
     """
     best = points, faces, -1
     search = _Search(objective, strategy, deadline)
@@ -113,7 +118,7 @@ def remove_faults(
             best = points, faces, len(faults)
         if len(faults) == 0:
             break
-        changes = search.changes(_Round(surface, faults, objective, reference))
+        changes = search.changes(_Round(surface, faults, objective, reference, strategy.held))
         if not changes:
             break
         points, faces = apply_changes(surface, changes)
@@ -123,8 +128,11 @@ def remove_faults(
 class _Round:
     """A mesh and its faults at the start of a round, with the patches around them."""
 
-    def __init__(self, surface: Surface, faults: Ints, objective: Objective, reference: ClosestPoints) -> None:
+    def __init__(
+        self, surface: Surface, faults: Ints, objective: Objective, reference: ClosestPoints, held: Held
+    ) -> None:
         self.surface, self.faults, self.reference = surface, faults, reference
+        self.held, self.n_held_faces = at_places(surface.points, held.places), held.n_faces
         self.patch_faces = list(objective.patch_faces(surface, faults))
         self.faulty = np.zeros(surface.n_faces, dtype=bool)
         self.faulty[faults] = True
@@ -134,7 +142,8 @@ class _Round:
         """Return the patch of one fault."""
         if k not in self._patches:
             faces = self.patch_faces[k]
-            self._patches[k] = Patch.cut(self.surface, faces, self.faults[k], self.faulty[faces], self.reference)
+            fault, faulty = self.faults[k], self.faulty[faces]
+            self._patches[k] = Patch.cut(self.surface, faces, fault, faulty, self.reference, self.held)
         return self._patches[k]
 
 
@@ -176,13 +185,18 @@ class _Search:
             if (number, patch.key) in self.failed:
                 continue
             self.tries += 1 + len(faces) // _FACES_PER_TRY
-            change = _best_change(patch, source, self.objective, allow_equal=on_plateau)
+            change = _best_change(patch, partial(_allowed, source, start), self.objective, allow_equal=on_plateau)
             if change is None:
                 self.failed.add((number, patch.key))
             else:
                 busy[faces] = True
                 changes.append(patch.in_mesh(change, start.surface.n_points))
         return changes
+
+
+def _allowed(source: Candidates, start: _Round, patch: Patch) -> list[Change]:
+    """Return the changes of a source that leave the faces as they are that stay."""
+    return [change for change in source(patch) if (patch.faces[change.gone] >= start.n_held_faces).all()]
 
 
 def _best_change(patch: Patch, source: Candidates, objective: Objective, *, allow_equal: bool) -> Change | None:
@@ -207,10 +221,13 @@ def is_sound(patch: Patch, change: Change) -> bool:
 
     Not more of them, that is, than it takes away.
     """
+    return patch.keeps_topology(change) and is_sound_in_shape(patch, change)
+
+
+def is_sound_in_shape(patch: Patch, change: Change) -> bool:
+    """Return whether a change makes no more triangles inverted, unclear or thin than it takes away."""
     old, new = patch.corners[change.gone], change.corners(patch.surface.points)
-    if geometry.thickness(new).min() < min(MIN_THICKNESS, geometry.thickness(old).min()):
-        return False
-    if not patch.keeps_topology(change):
+    if geometry.thickness(new).min(initial=np.inf) < min(MIN_THICKNESS, geometry.thickness(old).min()):
         return False
     corners, sign = np.concatenate([new, old]), np.repeat([1, -1], [len(new), len(old)])
     unclear = np.flatnonzero(~patch.reference.clearly_facing(corners))

@@ -15,6 +15,7 @@ from anisomesh.meshops import candidates
 from anisomesh.meshops.change import Change, Ints, Patch, faces_beside
 from anisomesh.meshops.engine import MIN_THICKNESS, Strategy, remove_faults
 from anisomesh.meshops.flip import do_flips, possible_flips
+from anisomesh.meshops.held import Held
 
 MAX_INVERSION_ROUNDS = 100  # heuristic: hard training meshes take about 70
 _MAX_INVERSION_PLATEAUS = 40  # heuristic
@@ -22,7 +23,12 @@ _PLATEAU_TRIES = 32  # random moves tried for a triangle that nothing helps; wit
 
 
 def remove_inverted_triangles(
-    points: Points, faces: Faces, reference: ClosestPoints, *, deadline: Deadline = NO_DEADLINE
+    points: Points,
+    faces: Faces,
+    reference: ClosestPoints,
+    *,
+    held: Held | None = None,
+    deadline: Deadline = NO_DEADLINE,
 ) -> tuple[Points, Faces, int]:
     """Remove triangles that face away from the reference, without changing the topology.
 
@@ -32,6 +38,8 @@ def remove_inverted_triangles(
         An oriented manifold mesh (V, 3), (F, 3).
     reference
         The surface that the mesh approximates.
+    held
+        Points and faces that stay.
     deadline
         Asked before every inverted triangle whether to end.
 
@@ -45,7 +53,7 @@ def remove_inverted_triangles(
     First all edges are flipped whose flip lowers the number of inverted triangles; the rest is left to
     :func:`~anisomesh.meshops.engine.remove_faults`, which tries one triangle after the other.
     """
-    faces = _flip_inverted(points, faces, reference)
+    faces = _flip_inverted(points, faces, reference, 0 if held is None else held.n_faces)
     rng = np.random.default_rng(0)
 
     def random_nudges(patch: Patch) -> list[Change]:
@@ -64,14 +72,15 @@ def remove_inverted_triangles(
         plateau=random_nudges,
         max_rounds=MAX_INVERSION_ROUNDS,
         max_plateaus=_MAX_INVERSION_PLATEAUS,
+        held=held or Held(),
     )
     return remove_faults(points, faces, reference, _InvertedTriangles(reference), strategy, deadline=deadline)
 
 
-def _flip_inverted(points: Points, faces: Faces, reference: ClosestPoints) -> Faces:
+def _flip_inverted(points: Points, faces: Faces, reference: ClosestPoints, n_held: int) -> Faces:
     """Return the faces (F, 3) after flips, as long as any lowers the number of inverted triangles.
 
-    As in the engine, no flip makes a thin triangle, unless it takes away a thinner one.
+    The first ``n_held`` faces stay. As in the engine, no flip makes a thin triangle unless it takes away a thinner one.
     """
     while True:
         surface = Surface(points, faces)
@@ -85,7 +94,7 @@ def _flip_inverted(points: Points, faces: Faces, reference: ClosestPoints) -> Fa
         )
         sound = after >= np.minimum(MIN_THICKNESS, before)
         order = np.lexsort((-after, -gain))
-        order = order[((gain > 0) & sound)[order]]
+        order = order[((gain > 0) & sound & (flips.pair >= n_held).all(axis=1))[order]]
         if len(order) == 0:
             return faces
         faces = do_flips(surface, flips, order)

@@ -16,13 +16,20 @@ from anisomesh.mesh.validity import new_intersections
 from anisomesh.meshops import candidates
 from anisomesh.meshops.change import Change, Ints, Patch, faces_beside
 from anisomesh.meshops.engine import Strategy, remove_faults
+from anisomesh.meshops.held import Held
 
 MAX_INTERSECTION_ROUNDS = 30
 _MAX_INTERSECTION_PLATEAUS = 6
 
 
 def remove_self_intersections(
-    points: Points, faces: Faces, reference: ClosestPoints, *, max_tries: int = 300, deadline: Deadline = NO_DEADLINE
+    points: Points,
+    faces: Faces,
+    reference: ClosestPoints,
+    *,
+    held: Held | None = None,
+    max_tries: int = 300,
+    deadline: Deadline = NO_DEADLINE,
 ) -> tuple[Points, Faces, int]:
     """Remove pairs of triangles that intersect, where the reference does not, without changing the topology.
 
@@ -32,6 +39,8 @@ def remove_self_intersections(
         An oriented manifold mesh (V, 3), (F, 3).
     reference
         The surface that the mesh approximates.
+    held
+        Points and faces that stay.
     max_tries
         Pairs that are looked at, in all rounds together; one amid many faces counts for several.
     deadline
@@ -52,6 +61,7 @@ def remove_self_intersections(
         max_rounds=MAX_INTERSECTION_ROUNDS,
         max_plateaus=_MAX_INTERSECTION_PLATEAUS,
         max_tries=max_tries,
+        held=held or Held(),
     )
     return remove_faults(points, faces, reference, _NewIntersections(reference), strategy, deadline=deadline)
 

@@ -9,22 +9,24 @@ from typing import Any, NamedTuple
 import numpy as np
 import numpy.typing as npt
 
-from anisomesh._arrays import EdgeMask, PointMask, PointScalars, PointTensors, real_array
+from anisomesh._arrays import EdgeMask, PointMask, Points, PointScalars, PointTensors, real_array
 from anisomesh.attributes.charts import Joints, with_seams_at_corners
 from anisomesh.attributes.model import Mesh
 from anisomesh.errors import MetricError, OptionError
 from anisomesh.features.detect import sharp_edges
-from anisomesh.features.tagged import tagged_edges, tagged_points
+from anisomesh.features.tagged import tagged_edges
 from anisomesh.junctions.cut import Junctions, cut_at_junctions
-from anisomesh.mesh.geometry import even_edge_length
+from anisomesh.mesh.geometry import Frame, even_edge_length
 from anisomesh.mesh.surface import Surface
+from anisomesh.meshops.anchors import Anchors, places_found
 from anisomesh.metric.sizes import checked_sizes
 from anisomesh.metric.tensors import validate_metric
-from anisomesh.options import RemeshOptions
+from anisomesh.options import MIN_VERTICES, RemeshOptions
 from anisomesh.repair.carried_data import without_t_junctions
 from anisomesh.repair.near_points import weld_distance
 from anisomesh.repair.prepare import Prepared, PrepareReport, prepare
 from anisomesh.resolve import follows_creases, is_designed
+from anisomesh.setup.fixed import with_fixed_points
 
 _MAX_BORDER_SHARE = 0.4  # of the vertices asked for, that borders and seams may take; heuristic
 _LARGEST_DENSITY = 1e30  # and inverse of the smallest, so that energies are far from overflow
@@ -59,6 +61,10 @@ class PreparedInput:
         follow them where there are enough vertices.
     fixed
         Which of its points (V,) stay.
+    outline
+        Which of its edges (E,) stay as they are: edges of the boundary between fixed points.
+    least
+        Vertices that a mesh has at least.
     """
 
     prepared: Prepared
@@ -70,9 +76,42 @@ class PreparedInput:
     borders: EdgeMask
     seams: EdgeMask
     fixed: PointMask
+    outline: EdgeMask
+    least: int = MIN_VERTICES
+
+    def checked_count(self, n_vertices: int) -> int:
+        """Return a number of vertices, or raise OptionError if more points are kept."""
+        if n_vertices < self.least:
+            raise OptionError(
+                f"{n_vertices:,} vertices are asked for, and keep_points and fixed points of the mesh are "
+                f"{self.least:,}; ask for at least as many, or keep fewer points"
+            )
+        return n_vertices
+
+    def anchors(self, n_vertices: int, frame: Frame) -> Anchors:
+        """Return the anchors of a mesh of a number of vertices at bounding-box diagonal 1.
+
+        There are none if more points are fixed than the mesh has vertices. Fixed points on junctions are nodes, at
+        which all sheets get a vertex when they are joined.
+        """
+        anchored = self.fixed if self.junctions is None else self.fixed & ~self.junctions.on_several
+        if np.count_nonzero(anchored) > n_vertices:
+            return Anchors()
+        number = np.cumsum(anchored) - 1
+        surface = self.prepared.surface
+        return Anchors(frame.to_unit(surface.points[anchored]), number[surface.edges[self.outline]])
+
+    def to_model(self, points: Points, frame: Frame) -> Points:
+        """Return points (n, 3) in model units, fixed ones exactly where they are on the prepared surface."""
+        moved = frame.to_model(points)
+        places = self.prepared.surface.points[self.fixed]
+        if len(places):
+            number = places_found(points, frame.to_unit(places))
+            moved[number >= 0] = places[number[number >= 0]]
+        return moved
 
     @property
-    def whole(self) -> Surface:
+    def surface(self) -> Surface:
         """The prepared surface, its sheets joined."""
         return self.prepared.surface if self.junctions is None else self.junctions.whole
 
@@ -116,14 +155,16 @@ def prepared_input(mesh: Mesh, options: RemeshOptions, *, joined: bool = True) -
     MetricError
         If prescribed tensors are not symmetric positive definite, one per point of the input.
     OptionError
-        If densities or sizes are not positive, one per point, or features are not edges of the input.
+        If densities or sizes are not positive, one per point, features are not edges of the input, or points to keep
+        are not points of it.
     """
     surface = mesh.surface
-    prepared = prepare(surface, weld_tolerance=options.weld_tolerance)
-    junctions = cut_at_junctions(prepared) if joined else None
+    prepared, fixed = with_fixed_points(mesh, prepare(surface, weld_tolerance=options.weld_tolerance), options)
+    junctions = cut_at_junctions(prepared, fixed) if joined else None
     if junctions is not None:
         sheets, source = junctions.sheets, prepared.point_source[junctions.source]
         none = np.zeros(len(sheets.edges), dtype=bool)
+        fixed = fixed[junctions.source] & ~junctions.added
         prepared = replace(prepared, surface=sheets, point_source=source, junctions=none)
     tensors = density = None
     if options.has_tensors:
@@ -144,7 +185,10 @@ def prepared_input(mesh: Mesh, options: RemeshOptions, *, joined: bool = True) -
     prescribed = [mesh.features, *([] if options.features is None else [options.features])]
     borders, seams = _borders(with_split_sides(mesh, prepared.report, options), prepared.surface, options)
     tagged = _tagged(prescribed, surface, prepared.surface, options)
-    fixed = tagged_points(surface, mesh.fixed_points, prepared.surface, options.weld_tolerance)
+    least = MIN_VERTICES
+    if options.keep_points is not None:
+        kept = np.flatnonzero(fixed) if junctions is None else np.unique(junctions.joined[fixed])
+        least = max(least, len(kept))
     if junctions is not None:  # which are boundaries, and followed as such
         inside = prepared.surface.edge_face_count == 2
         tagged, borders, seams, fixed = tagged & inside, borders & inside, seams & inside, fixed | junctions.graph.nodes
@@ -158,6 +202,8 @@ def prepared_input(mesh: Mesh, options: RemeshOptions, *, joined: bool = True) -
         borders=borders,
         seams=seams,
         fixed=fixed,
+        least=least,
+        outline=np.zeros(len(prepared.surface.edges), dtype=bool),
     )
 
 

@@ -117,9 +117,12 @@ def measure(source: PreparedInput, n: int, options: RemeshOptions, run: Run) -> 
         field = checked_field(metric_source(options, surface, tensors)(split.surface), split.surface)
         working = split.surface
         if field.points is not None:
-            working = working.with_points(field.points)
+            kept = np.flatnonzero(split.on_coarse(source.fixed))
+            points = np.array(field.points)
+            points[kept] = working.points[kept]
+            working = working.with_points(points)
             tagged = split.coarse_tagged
-            surface = split.coarse.with_points(field.points[: split.coarse.n_points])
+            surface = split.coarse.with_points(points[: split.coarse.n_points])
         field = limit_to_patches(field, working, n)
     return Measured(
         options=options,

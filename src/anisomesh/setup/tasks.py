@@ -82,6 +82,7 @@ def set_up(source: PreparedInput, n: int, options: RemeshOptions, run: Run, *, n
             n_vertices=n,
             deadline=run.deadline,
             error_weights=weights,
+            anchors=source.anchors(n, measured.frame),
         )
         plan = fit_plan(options, surface, nearest=nearest)
         if plan is not None and source.junctions is not None:  # a decimation of sheets would not fit together
@@ -132,7 +133,7 @@ def _fit_target(
         crease_angle=options.feature_angle,
         plan=plan,
     )
-    return replace(target, lines=task.surface.edges[tagged].astype(np.int64))
+    return replace(target, lines=task.surface.edges[tagged].astype(np.int64), anchors=task.anchors)
 
 
 def _features(

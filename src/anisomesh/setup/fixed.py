@@ -1,0 +1,79 @@
+"""Points of the input at which the result has vertices, found again on the prepared surface."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+from scipy.spatial import cKDTree
+
+from anisomesh._arrays import PointMask
+from anisomesh.attributes.model import Ints, Mesh
+from anisomesh.errors import OptionError
+from anisomesh.features.tagged import search_radius
+from anisomesh.options import RemeshOptions
+from anisomesh.repair.prepare import Prepared
+
+
+def with_fixed_points(mesh: Mesh, prepared: Prepared, options: RemeshOptions) -> tuple[Prepared, PointMask]:
+    """Return the prepared surface with fixed points and points to keep exactly where they were, and which these are.
+
+    Raises
+    ------
+    OptionError
+        If ``keep_points`` are not points of the mesh, or have vanished in the repair.
+
+    Notes
+    -----
+    Repair merges and copies points, so they are found again by their positions, all copies of each.
+    """
+    asked = checked_points("keep_points", options.keep_points, mesh.surface.n_points)
+    wanted = np.concatenate([asked, mesh.fixed_points])
+    fixed = np.zeros(prepared.surface.n_points, dtype=bool)
+    if len(wanted) == 0:
+        return prepared, fixed
+    places, points = mesh.surface.points[wanted], np.array(prepared.surface.points)
+    radius = search_radius(mesh.surface, options.weld_tolerance)
+    tree = cKDTree(points)
+    distance, nearest = tree.query(places)
+    lost = np.flatnonzero(distance[: len(asked)] > radius)
+    if len(lost):
+        raise OptionError(
+            f"keep_points has {asked[lost[0]]}, which is no point after the repair of the mesh: no face with an area "
+            "has it, or it was merged with points farther away; leave it out, or lower weld_tolerance"
+        )
+    owner = np.full(len(points), -1)
+    copies = tree.query_ball_point(points[nearest], 0.0)
+    for k in np.flatnonzero(distance <= radius).tolist():
+        other = owner[nearest[k]]
+        if other >= 0 and k < len(asked) and (places[k] != places[other]).any():
+            raise OptionError(
+                f"keep_points has {wanted[other]} and {wanted[k]}, which become one point with weld_tolerance = "
+                f"{options.weld_tolerance}; keep one of them, or lower weld_tolerance"
+            )
+        if other < 0:
+            owner[copies[k]] = k
+    fixed = owner >= 0
+    if (points[fixed] == places[owner[fixed]]).all():
+        return prepared, fixed
+    points[fixed] = places[owner[fixed]]
+    return replace(prepared, surface=prepared.surface.with_points(points)), fixed
+
+
+def checked_points(name: str, values: npt.ArrayLike | None, n_points: int) -> Ints:
+    """Return points of a mesh as integers (n,), each once, or raise OptionError unless they are."""
+    if values is None:
+        return np.zeros(0, dtype=np.int64)
+    given: npt.NDArray[Any] = np.asarray(values)
+    if given.size == 0:
+        return np.zeros(0, dtype=np.int64)
+    if given.ndim != 1 or given.dtype.kind not in "iu":
+        raise OptionError(
+            f"{name} has shape {given.shape} and type {given.dtype}; expected (n,) whole numbers, a point each"
+        )
+    wrong = given[(given < 0) | (given >= n_points)]
+    if len(wrong):
+        raise OptionError(f"{name} has {wrong[0]}; expected 0 to {n_points - 1} since there are {n_points:,} points")
+    return np.unique(given).astype(np.int64)

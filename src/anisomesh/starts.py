@@ -1,0 +1,112 @@
+"""The mesh of a task: optimised sites, their dual, and the fit, from one seed after the other until it has no fault."""
+
+from __future__ import annotations
+
+import logging
+from dataclasses import dataclass, replace
+from functools import partial
+
+from anisomesh.cvt.lbfgs import Optimised
+from anisomesh.cvt.schedule import DualFeedback, optimise_sites
+from anisomesh.delaunay.creases import missing_on_creases
+from anisomesh.delaunay.dual import dual_squared_errors
+from anisomesh.delaunay.meshing import MeshingTask, ValidMesh, mesh_from_sites
+from anisomesh.execution.run import OPTIMISATION_SHARE, Run
+from anisomesh.features.tagged import distance_to_crease_edges
+from anisomesh.fitting.target import FitTarget
+from anisomesh.fitting.valid import fit_without_faults
+from anisomesh.io.describe import soundness
+from anisomesh.junctions.join import JoinTask
+from anisomesh.mesh.surface import Surface
+from anisomesh.mesh.validity import Validity, check_validity
+from anisomesh.options import RemeshOptions
+from anisomesh.resolve import cvt_options
+from anisomesh.voronoi.restricted import RestrictedVoronoi
+
+logger = logging.getLogger(__name__)
+
+MAX_STARTS = 3  # of the optimisation, with one seed after the other, for a mesh without faults
+
+
+@dataclass(frozen=True, eq=False)
+class MeshTask:
+    """How a mesh is made from sites, what it is fitted to, and how its sheets are joined; None if that is not done."""
+
+    dual: MeshingTask
+    fit: FitTarget | None
+    join: JoinTask | None
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class MadeMesh:
+    """A mesh, its distance from prescribed edges, the sites it was made from, and the seed of their start."""
+
+    mesh: ValidMesh
+    optimised: Optimised
+    validity: Validity
+    feature_distance: float
+    seed: int
+
+    @property
+    def faults(self) -> int:
+        """Faults that another start may avoid."""
+        return self.validity.inverted + self.validity.new_intersections + self.validity.flat
+
+
+def valid_mesh(task: MeshTask, options: RemeshOptions, run: Run) -> MadeMesh | None:
+    """Return the mesh of a task; from the next seeds while it has faults that the input does not explain.
+
+    None if its sheets cannot be joined.
+    """
+    best = made = _mesh_of_start(task, options, run)
+    for seed in range(options.seed + 1, options.seed + MAX_STARTS):
+        if best is None or made is None or not best.faults or run.deadline.passed():
+            break
+        if made.validity.self_intersections_input > 0 or made.mesh.from_input:
+            break
+        fresh = replace(task.dual, voronoi=RestrictedVoronoi(task.dual.voronoi.embedded, threads=options.threads))
+        made = _mesh_of_start(replace(task, dual=fresh), replace(options, seed=seed), run)
+        if made is not None and made.faults < best.faults:
+            best = made
+    return best
+
+
+def _mesh_of_start(start: MeshTask, options: RemeshOptions, run: Run) -> MadeMesh | None:
+    """Return the mesh of a task from the sites that start from the seed of the options; None if it cannot be joined."""
+    task, target, join = start.dual, start.fit, start.join
+    with run.stage("cvt"):
+        optimised = optimise_sites(
+            task.voronoi,
+            task.n_vertices,
+            task.features,
+            cvt_options(options, sized=task.error_weights is not None),
+            feedback=DualFeedback(partial(dual_squared_errors, weights=task.error_weights), missing_on_creases),
+            on_step=run.on_step,
+            deadline=run.deadline.share(OPTIMISATION_SHARE),
+        )
+    with run.stage("dual"):
+        mesh = mesh_from_sites(task, optimised.sites)
+        conforming = None if join is None else join.conforming(mesh)
+        if conforming is not None:
+            mesh = conforming.mesh
+        elif join is not None:
+            return None
+    with run.stage("fit"):
+        surface = Surface(mesh.points, mesh.faces)
+        feature_distance = distance_to_crease_edges(
+            task.voronoi.embedded.surface, task.features.required, surface, mesh.crease_edges
+        )
+        if target is not None:
+            surface = fit_without_faults(surface, target, crease_edges=mesh.crease_edges, deadline=run.deadline)
+            mesh = replace(mesh, points=surface.points, faces=surface.faces, crease_edges=mesh.crease_edges[:0])
+        if conforming is not None and join is not None:
+            joined = join.joined(conforming.after(surface))
+            if joined is None:
+                return None
+            mesh, surface = replace(mesh, points=joined.points, faces=joined.faces), joined
+        validity = check_validity(surface, task.surface, None if join is None else join.junctions.whole)
+    facts = options.seed, optimised.iterations, optimised.status, soundness(validity)
+    logger.info("seed %d: %d iterations, %s; mesh: %s", *facts)
+    return MadeMesh(
+        mesh=mesh, optimised=optimised, validity=validity, feature_distance=feature_distance, seed=options.seed
+    )
