@@ -84,3 +84,23 @@ def test_sheets_that_cannot_be_joined_are_apart_and_it_is_said(monkeypatch):
     assert [warning for warning in result.warnings if "separate in the result" in warning]
     assert result.surface.n_points == 120
     assert result.validity.nonmanifold_edges == 0
+
+
+@pytest.mark.parametrize("name", ["two_boxes", "soap_films"])
+def test_points_to_keep_on_a_junction_are_vertices_of_all_its_sheets(name):
+    surface = Surface(*SHAPES[name]())
+    on_junction = np.unique(surface.edges[surface.edge_face_count > 2])
+    kept = np.concatenate([on_junction[:: len(on_junction) // 3][:4], np.setdiff1d(range(100), on_junction)[::30]])
+    n = 150
+    result = anisomesh.remesh(surface, n_vertices=n, keep_points=kept, threads=1)
+    check_joined(surface, result, n)
+    found = (result.surface.points[:, None] == surface.points[kept]).all(axis=2)
+    assert (found.sum(axis=0) == 1).all()
+
+
+def test_beside_locked_faces_sheets_stay_apart_and_that_is_said():
+    surface = Surface(*SHAPES["two_boxes"]())
+    lock = np.arange(surface.n_faces) < 10
+    result = anisomesh.remesh(surface, n_vertices=200, lock=lock, threads=1)
+    assert result.validity.nonmanifold_edges == 0
+    assert any("separate" in warning for warning in result.warnings)

@@ -19,6 +19,7 @@ from anisomesh.mesh.topology import edge_keys
 from anisomesh.meshops.change import apply_changes
 from anisomesh.meshops.decimation import decimate
 from anisomesh.meshops.flip import flip_for_shape
+from anisomesh.meshops.held import Held
 from anisomesh.meshops.inverted import remove_inverted_triangles
 from anisomesh.meshops.split import edge_split, split_longest_edges
 from anisomesh.metric.transfer import transfer_metric_roots
@@ -173,7 +174,9 @@ class JoinTask:
 
 def _tidied(mesh: ValidMesh, task: MeshingTask) -> ValidMesh:
     """Return a mesh with inverted triangles repaired, and edges flipped where that makes better triangles."""
-    points, faces, _ = remove_inverted_triangles(mesh.points, mesh.faces, task.reference, deadline=task.deadline)
+    points, faces, _ = remove_inverted_triangles(
+        mesh.points, mesh.faces, task.reference, held=Held(task.anchors.places), deadline=task.deadline
+    )
     creases = mesh.crease_edges
     if points is not mesh.points:
         creases = renumbered(mesh.points, points)[creases]
@@ -247,7 +250,7 @@ def _with_count(
     """Return points, faces and crease edges with a number of points, if possible; some points (n, 3) stay."""
     sheets = Surface(mesh.points, mesh.faces)
     if n_points < sheets.n_points:
-        held = seam.labels(sheets) >= 0
+        held = (seam.labels(sheets) >= 0) | task.anchors.held_in(sheets.points)
         again = renumbered(apart, sheets.points)
         held[again[again >= 0]] = True
         fewer = decimate(
