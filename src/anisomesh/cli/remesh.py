@@ -8,7 +8,9 @@ from typing import Annotated, Any
 
 import typer
 
+from anisomesh.cli.adapt_to import AdaptTo
 from anisomesh.cli.arguments import (
+    DEFAULT_OPTIONS,
     REMESH_OPTIONS,
     Length,
     Quiet,
@@ -72,6 +74,20 @@ def command(
             help="Weights of the vertices of IN, larger for smaller triangles: a text file, one number per line.",
         ),
     ] = None,
+    adapt_to: Annotated[
+        str | None,
+        _input(
+            metavar="[FILE:]FIELD",
+            help="Adapt the mesh to this field at the vertices of IN, or of another mesh of the surface: small and "
+            "stretched triangles where the field bends. With -n or --ratio.",
+        ),
+    ] = None,
+    norm: Annotated[
+        str,
+        _input(
+            metavar="P", help="With --adapt-to: the L^p norm of the error to be small, 2 or a larger number or inf."
+        ),
+    ] = "2",
     weld: Annotated[
         str | None,
         _input(
@@ -96,6 +112,11 @@ def command(
         raise typer.BadParameter("give one of -n (number of vertices), --ratio, --max-error and --edge-length")
     length = None if edge_length is None else Length.parse(edge_length, "--edge-length")
     error = None if max_error is None else Length.parse(max_error, "--max-error")
+    solution = None if adapt_to is None else AdaptTo.parse(adapt_to, norm)
+    if solution is not None and (error is not None or length is not None):
+        raise typer.BadParameter("--adapt-to says where triangles are small, not how small; give -n or --ratio with it")
+    if solution is not None and options["metric"] != DEFAULT_OPTIONS.metric:
+        raise typer.BadParameter("--adapt-to and --metric both say what the metric is; leave one out")
     gap = None if weld in (None, "auto") else Length.parse(weld, "--weld")
     out = default_output(source, input_format, output_format) if out is None else out
     outputs = Outputs(mesh=out, mesh_format=output_format, report=report, rvd=rvd, picture=picture)
@@ -104,7 +125,7 @@ def command(
         raise typer.BadParameter("-o - and --json both write to standard output; use --report FILE")
     weights = options.get("weights")
     check_input_format(source, input_format)
-    others = features, density, None if weights is None else Path(weights)
+    others = features, density, None if weights is None else Path(weights), None if solution is None else solution.file
     outputs.check(None if source == STANDARD_STREAM else source, *others)
     if features is not None or density is not None:
         from anisomesh.io.text_tables import load_numbers, load_pairs
@@ -114,6 +135,8 @@ def command(
     with progress(quiet) as display:
         mesh, seconds = read_mesh(source, input_format)
         options |= {"n_vertices": n_vertices, "ratio": ratio}
+        if solution is not None:
+            options["metric"] = solution.metric(mesh)
         options["max_error"] = None if error is None else error.on(mesh.surface)
         options["edge_length"] = None if length is None else length.on(mesh.surface)
         if weld is not None:
@@ -124,6 +147,8 @@ def command(
             "features": None if features is None else str(features),
             "density": None if density is None else str(density),
         }
+        if solution is not None:
+            facts["options"] |= {"metric": None, "adapt_to": adapt_to, "norm": norm}
         outputs.write(result, facts, display)
     if json_:
         typer.echo(as_json(facts))

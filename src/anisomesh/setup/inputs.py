@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -15,9 +15,11 @@ from anisomesh.attributes.model import Mesh
 from anisomesh.errors import MetricError, OptionError
 from anisomesh.features.detect import sharp_edges
 from anisomesh.features.tagged import tagged_edges, tagged_points
+from anisomesh.mesh.closest_points import ClosestPoints
 from anisomesh.mesh.geometry import even_edge_length
 from anisomesh.mesh.surface import Surface
 from anisomesh.metric.sizes import checked_sizes
+from anisomesh.metric.solution import SolutionMetric, checked_values
 from anisomesh.metric.tensors import validate_metric
 from anisomesh.options import RemeshOptions
 from anisomesh.repair.near_points import weld_distance
@@ -25,6 +27,7 @@ from anisomesh.repair.prepare import Prepared, prepare
 from anisomesh.resolve import follows_creases, is_designed
 
 _MAX_BORDER_SHARE = 0.4  # of the vertices asked for, that borders and seams may take; heuristic
+_MAX_MEAN_DISTANCE = 0.05  # of the input from the surface of a solution, over the diagonal: another one is a mistake
 _LARGEST_DENSITY = 1e30  # and inverse of the smallest, so that energies are far from overflow
 
 
@@ -38,6 +41,8 @@ class PreparedInput:
         The prepared surface.
     tensors, density
         Metric (V, 3, 3) and density (V,) at its points, None if they are not prescribed.
+    solution
+        The function to which the mesh is adapted, on a repaired surface, None if there is none.
     sizes
         Lengths of edges at its points (V,), None if there are none or they are a function.
     tagged
@@ -52,6 +57,7 @@ class PreparedInput:
     prepared: Prepared
     tensors: PointTensors | None
     density: PointScalars | None
+    solution: SolutionMetric | None
     sizes: PointScalars | None
     tagged: EdgeMask
     borders: EdgeMask
@@ -85,7 +91,8 @@ def prepared_input(mesh: Mesh, options: RemeshOptions) -> PreparedInput:
     MeshError
         If nothing is left of the surface after the repair.
     MetricError
-        If prescribed tensors are not symmetric positive definite, one per point of the input.
+        If prescribed tensors are not symmetric positive definite, one per point of the input, or there is not one value
+        of a solution per point.
     OptionError
         If densities or sizes are not positive, one per point, or features are not edges of the input.
     """
@@ -113,12 +120,28 @@ def prepared_input(mesh: Mesh, options: RemeshOptions) -> PreparedInput:
         prepared=prepared,
         tensors=tensors,
         density=density,
+        solution=_solution(options.metric, surface, prepared) if isinstance(options.metric, SolutionMetric) else None,
         sizes=sizes,
         tagged=_tagged(prescribed, surface, prepared.surface, options),
         borders=borders,
         seams=seams,
         fixed=tagged_points(surface, mesh.fixed_points, prepared.surface, options.weld_tolerance),
     )
+
+
+def _solution(metric: SolutionMetric, surface: Surface, prepared: Prepared) -> SolutionMetric:
+    """Return the metric of a solution on a repaired surface: the prepared one, or the one that the metric has."""
+    if metric.surface is None:
+        values = checked_values(metric.values, surface.n_points)[prepared.point_source]
+        return replace(metric, values=values, surface=prepared.surface)
+    own = prepare(metric.surface)
+    distance = np.sqrt(ClosestPoints(own.surface).squared_distances(prepared.surface.points)).mean()
+    if distance > _MAX_MEAN_DISTANCE * prepared.surface.diagonal:
+        raise MetricError(
+            f"the surface of the solution is {distance:.3g} from the points of the input on average, "
+            f"{distance / prepared.surface.diagonal:.0%} of the diagonal; expected a mesh of the same surface"
+        )
+    return replace(metric, values=checked_values(metric.values)[own.point_source], surface=own.surface)
 
 
 def _tagged(
