@@ -12,6 +12,8 @@ if TYPE_CHECKING:
     from anisomesh.attributes.model import Mesh
     from anisomesh.metric.solution import SolutionMetric
 
+DEFAULT_NORM = "2"
+
 
 @dataclass(frozen=True)
 class AdaptTo:

@@ -8,7 +8,7 @@ from typing import Annotated, Any
 
 import typer
 
-from anisomesh.cli.adapt_to import AdaptTo
+from anisomesh.cli.adapt_to import DEFAULT_NORM, AdaptTo
 from anisomesh.cli.arguments import (
     DEFAULT_OPTIONS,
     REMESH_OPTIONS,
@@ -112,7 +112,9 @@ def command(
         raise typer.BadParameter("give one of -n (number of vertices), --ratio, --max-error and --edge-length")
     length = None if edge_length is None else Length.parse(edge_length, "--edge-length")
     error = None if max_error is None else Length.parse(max_error, "--max-error")
-    solution = None if adapt_to is None else AdaptTo.parse(adapt_to, norm)
+    solution = None if adapt_to is None else AdaptTo.parse(adapt_to, norm or DEFAULT_NORM)
+    if solution is None and norm is not None:
+        raise typer.BadParameter("--norm goes with --adapt-to; give both or leave it out")
     if solution is not None and (error is not None or length is not None):
         raise typer.BadParameter("--adapt-to says where triangles are small, not how small; give -n or --ratio with it")
     if solution is not None and options["metric"] != DEFAULT_OPTIONS.metric:
@@ -148,7 +150,7 @@ def command(
             "density": None if density is None else str(density),
         }
         if solution is not None:
-            facts["options"] |= {"metric": None, "adapt_to": adapt_to, "norm": norm}
+            facts["options"] |= {"metric": None, "adapt_to": adapt_to, "norm": norm or DEFAULT_NORM}
         outputs.write(result, facts, display)
     if json_:
         typer.echo(as_json(facts))
