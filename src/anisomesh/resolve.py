@@ -107,7 +107,7 @@ def metric_source(options: RemeshOptions, surface: Surface, prescribed: MetricSo
 def embedder(options: RemeshOptions) -> Embedder:
     """Return the embedder that the options name."""
     if isinstance(options.embedding, str):
-        return Direct(iterations=options.embedding_iterations)
+        return Direct(iterations=options.embedding_iterations, unfolded=prescribes_sizes(options))
     return options.embedding
 
 

@@ -28,6 +28,7 @@ def embed(
     extra_dimensions: int = 5,
     max_iterations: int = 10,
     tolerance: float = 1e-3,
+    unfolded: bool = False,
 ) -> Embedding:
     """Embed a surface so that straight lengths in the embedding are lengths in the metric.
 
@@ -45,6 +46,8 @@ def embed(
         Largest number of local/global steps.
     tolerance
         Relative decrease of the residual by a step below which the iteration stops.
+    unfolded
+        Whether the start is the surface itself, for metrics whose sizes vary a lot.
 
     Returns
     -------
@@ -63,6 +66,10 @@ def embed(
     to carry without benefit), and Y carries T_f - c^2 I = S_f^2. From a start with the normals, a local step rotates
     the target gradient S_f to the current one, R_f = polar factor of (grad Y S_f), and a global step finds the Y with
     gradient closest to R_f S_f. Neither increases the residual. The start makes the result rotate with the surface.
+    Where sizes vary a lot, the usual start folds the surface: the sizes are the same on both sides of a layer of small
+    triangles, so the volume factor has its ridge there, and the two sides come to lie on each other, though each of
+    them has the right lengths. Cells would then reach from one side to the other. Started from the surface itself it
+    stays unfolded, with a larger residual where sizes vary in two directions.
     Three steps reach most of the agreement; regular triangles (the plain CVT) gain up to the default of ten.
 
     References
@@ -83,7 +90,9 @@ def embed(
         extra, residual, iterations = np.zeros((surface.n_points, extra_dimensions)), 0.0, 0
         status = EmbeddingStatus.EXACT
     else:
-        start = initial_coordinates(surface, tensors, gradient, extra_dimensions)
+        start = np.pad(surface.points, ((0, 0), (0, extra_dimensions - 3)))
+        if not unfolded:
+            start = initial_coordinates(surface, tensors, gradient, extra_dimensions)
         extra, residual, iterations = _local_global(surface, gradient, root, start, max_iterations, tolerance)
         limited = iterations == max_iterations
         status = EmbeddingStatus.ITERATION_LIMIT if limited else EmbeddingStatus.CONVERGED

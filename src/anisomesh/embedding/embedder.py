@@ -37,6 +37,8 @@ class Direct:
         Number of coordinates besides the first three, at least 3.
     tolerance
         Stop when a step lowers the residual by less than this part of it.
+    unfolded
+        Whether the surface stays unfolded, for metrics whose sizes vary a lot.
 
     Raises
     ------
@@ -51,6 +53,7 @@ class Direct:
     iterations: int = 10
     extra_dimensions: int = 5
     tolerance: float = 1e-3
+    unfolded: bool = False
 
     def __post_init__(self) -> None:
         whole_number("iterations", self.iterations, 1)
@@ -69,6 +72,7 @@ class Direct:
             extra_dimensions=self.extra_dimensions,
             max_iterations=self.iterations,
             tolerance=self.tolerance,
+            unfolded=self.unfolded,
         )
 
 
