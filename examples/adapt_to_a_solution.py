@@ -1,7 +1,7 @@
 """Adapt a mesh to a solution: solve, adapt, solve again, and compare the error at the same number of vertices.
 
-The problem is -e^2 div grad u + u = f on a tilted plate, with linear finite elements. Its solution is known: u = -1 in a
-disc and 1 around it, with a layer of width e between.
+The problem is -e^2 div grad u + u = f on a tilted plate, with linear finite elements. Its solution is known: u = -1 in
+a disc and 1 around it, with a layer of width e between.
 
 Usage: python examples/adapt_to_a_solution.py [OUT]    (extra: picture)
 """

@@ -24,7 +24,9 @@ def folder(tmp_path):
 @pytest.mark.slow
 @pytest.mark.parametrize(("source", "field"), [("solved.vtu", "u"), ("plain.stl", "solved.vtu:u")])
 def test_triangles_are_narrow_in_the_layer(run_cli, folder, source, field):
-    process = run_cli("remesh", source, "-n", 200, "--adapt-to", field, "--norm", "2", "-o", "a.vtu", "--json", cwd=folder)
+    process = run_cli(
+        "remesh", source, "-n", 200, "--adapt-to", field, "--norm", "2", "-o", "a.vtu", "--json", cwd=folder
+    )
     assert process.returncode == 0, process.stderr
     options = json.loads(process.stdout)["options"]
     assert (options["adapt_to"], options["norm"]) == (field, "2")

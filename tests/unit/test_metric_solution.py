@@ -8,8 +8,8 @@ from anisomesh.errors import MetricError, OptionError
 from anisomesh.io.meshes import mesh_of
 from anisomesh.mesh.subdivision import split_long_edges
 from anisomesh.mesh.surface import Surface
-from anisomesh.metric.hessian import recovered_hessians
-from anisomesh.metric.solution import SolutionMetric, optimal_metric
+from anisomesh.metric.solution.hessian import recovered_hessians
+from anisomesh.metric.solution.source import SolutionMetric, optimal_metric
 from anisomesh.options import RemeshOptions
 from anisomesh.setup.inputs import prepared_input
 from anisomesh.shapes.analytic import cylinder, open_patch, sphere

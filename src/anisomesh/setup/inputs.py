@@ -19,7 +19,7 @@ from anisomesh.mesh.closest_points import ClosestPoints
 from anisomesh.mesh.geometry import even_edge_length
 from anisomesh.mesh.surface import Surface
 from anisomesh.metric.sizes import checked_sizes
-from anisomesh.metric.solution import SolutionMetric, checked_values
+from anisomesh.metric.solution.source import SolutionMetric, checked_values
 from anisomesh.metric.tensors import validate_metric
 from anisomesh.options import RemeshOptions
 from anisomesh.repair.near_points import weld_distance

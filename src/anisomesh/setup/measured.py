@@ -157,7 +157,7 @@ def _spacings(metric: MetricSource, n: int, surface: Surface) -> Floats:
     field = checked_field(metric(surface), surface)
     along = surface.points[surface.edges[:, 1]] - surface.points[surface.edges[:, 0]]
     squared = np.einsum("ex,ekxy,ey->ek", along, field.tensors[surface.edges], along)
-    return np.sqrt(squared.max(axis=1)) / MetricExtent.of(surface, field).length(n)
+    return np.asarray(np.sqrt(squared.max(axis=1)) / MetricExtent.of(surface, field).length(n))
 
 
 def _prescribed(source: PreparedInput, surface: Surface, frame: Frame, options: RemeshOptions) -> MetricSource | None:

@@ -14,9 +14,9 @@ from anisomesh.mesh.closest_points import ClosestPoints
 from anisomesh.mesh.geometry import sums_at_points
 from anisomesh.mesh.surface import Surface
 from anisomesh.metric.field import MetricField
-from anisomesh.metric.hessian import recovered_hessians
 from anisomesh.metric.line_field import line_field_of_directions, one_ring_averages, projectors_of_line_field
 from anisomesh.metric.patches import smooth_patches
+from anisomesh.metric.solution.hessian import recovered_hessians
 from anisomesh.metric.tangent import tangent_frames, unit_normals
 from anisomesh.metric.transfer import field_near
 
@@ -24,8 +24,8 @@ _RINGS = 2  # of the neighbourhoods of the fit; creases shorter than that do not
 _ROUNDING = 1e-12  # second differences over the largest value, below which they are rounding: 1e-16 times sums
 _SMALLEST = 1e-12  # eigenvalue of a Hessian, over the largest one; its logarithm is averaged
 _SMOOTHING = 1  # one-ring averages of the logarithm of the metric: recovered derivatives are noisy; heuristic
-_MAX_ROUNDS = 100  # of the bound on the size, which converges linearly with the factor 1 / max_size^2
-_TOLERANCE = 1e-6  # relative change of that bound
+_FLOOR_ROUNDS = 100  # of the bound on the size, which converges linearly with the factor 1 / max_size^2
+_FLOOR_CHANGE = 1e-6  # relative change of that bound
 
 
 @dataclass(frozen=True, eq=False)
@@ -187,10 +187,10 @@ def _floor(surface: Surface, low: PointScalars, high: PointScalars, max_size: fl
     """
     area = sums_at_points(surface.face_areas / 3.0, surface.faces, surface.n_points)
     floor = 0.0
-    for _ in range(_MAX_ROUNDS):
+    for _ in range(_FLOOR_ROUNDS):
         density = np.sqrt(np.maximum(low, floor) * np.maximum(high, floor))
         before, floor = floor, float(area @ density / area.sum()) / max_size**2
-        if abs(floor - before) <= _TOLERANCE * floor:
+        if abs(floor - before) <= _FLOOR_CHANGE * floor:
             break
     return floor
 
