@@ -43,7 +43,7 @@ class AdaptTo:
             raise typer.BadParameter(f"--norm {norm}: expected a number of at least 1, such as 2, or inf")
         return cls(Path(file) if file else None, field, p)
 
-    def metric(self, mesh: Mesh) -> SolutionMetric:
+    def metric(self, mesh: Mesh, crease_angle: float) -> SolutionMetric:
         """Return the metric of the field, ``mesh`` being the input.
 
         Raises
@@ -69,4 +69,4 @@ class AdaptTo:
                 "as the length of a vector"
             )
         surface = None if self.file is None else given.surface
-        return SolutionMetric(values.reshape(-1), surface=surface, norm=self.norm)
+        return SolutionMetric(values.reshape(-1), surface=surface, norm=self.norm, crease_angle=crease_angle)

@@ -83,11 +83,13 @@ def command(
         ),
     ] = None,
     norm: Annotated[
-        str,
+        str | None,
         _input(
-            metavar="P", help="With --adapt-to: the L^p norm of the error to be small, 2 or a larger number or inf."
+            metavar="P",
+            help="With --adapt-to: the L^p norm in which the error is to be small, a number of at least 1, or inf.",
+            show_default="2",
         ),
-    ] = "2",
+    ] = None,
     weld: Annotated[
         str | None,
         _input(
@@ -138,7 +140,7 @@ def command(
         mesh, seconds = read_mesh(source, input_format)
         options |= {"n_vertices": n_vertices, "ratio": ratio}
         if solution is not None:
-            options["metric"] = solution.metric(mesh)
+            options["metric"] = solution.metric(mesh, options["feature_angle"])
         options["max_error"] = None if error is None else error.on(mesh.surface)
         options["edge_length"] = None if length is None else length.on(mesh.surface)
         if weld is not None:
