@@ -20,7 +20,7 @@ import numpy as np
 
 import anisomesh
 from anisomesh import Surface
-from anisomesh.mesh.noise import with_noise
+from anisomesh.denoise.noise import with_noise
 from anisomesh.shapes import analytic as shapes
 from anisomesh.shapes.analytic import cylinder, ellipsoid, open_patch, sphere, torus, twisted_ring
 from anisomesh.shapes.parts import hollow_loft, sparse_parts

@@ -14,11 +14,11 @@ import os
 import numpy as np
 
 import anisomesh
+from anisomesh.denoise.noise import with_noise
 from anisomesh.learn.data.make import items_of_blobs
 from anisomesh.learn.data.recipe import Recipe
 from anisomesh.mesh.closest_points import ClosestPoints
 from anisomesh.mesh.distance import surface_distance
-from anisomesh.mesh.noise import with_noise
 from anisomesh.metric.quality import anisotropic_quality
 from anisomesh.metric.tensors import metric_root
 from anisomesh.metric.transfer import transfer_metric_roots

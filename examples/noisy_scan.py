@@ -10,7 +10,7 @@ import sys
 import numpy as np
 
 import anisomesh
-from anisomesh.mesh.noise import with_noise
+from anisomesh.denoise.noise import with_noise
 from anisomesh.viz import Panel, PictureOptions, gallery
 
 NOISE = 0.3  # mean edge lengths

@@ -208,6 +208,8 @@ class RemeshOptions:
                     raise OptionError(f"{name} limits a size_field, and there is none; give one or leave it out")
             if self.edge_length is not None and metric in ("approximation", "Approximation"):
                 raise OptionError("lengths in the metric 'approximation' have no unit; use max_error, or n_vertices")
+            if self.edge_length is not None and metric == "SolutionMetric":
+                raise OptionError("lengths in the metric of a solution have no unit; give n_vertices or ratio")
             return
         if metric != "uniform":
             raise OptionError(f"a size_field goes with metric='uniform', and the metric is {metric!r}")

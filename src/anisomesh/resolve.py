@@ -5,7 +5,6 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import replace
 
-from anisomesh._arrays import PointTensors
 from anisomesh.cvt.energy import Energy, NormalMetric
 from anisomesh.cvt.schedule import CVTOptions
 from anisomesh.denoise.source import Filtered
@@ -15,7 +14,7 @@ from anisomesh.fitting.fit import FitOptions, FitPlan
 from anisomesh.learn.inference.source import Hybrid, Neural
 from anisomesh.mesh.surface import Surface
 from anisomesh.metric.field import MetricSource
-from anisomesh.metric.sources import Approximation, Curvature, PrecomputedTensors, Uniform
+from anisomesh.metric.sources import Approximation, Curvature, Uniform
 from anisomesh.options import RemeshOptions
 
 DESIGNED_SHARE = 0.1
@@ -76,7 +75,7 @@ def is_designed(surface: Surface) -> bool:
     return share_of_flat_edges(surface) >= DESIGNED_SHARE
 
 
-def metric_source(options: RemeshOptions, surface: Surface, tensors: PointTensors | None) -> MetricSource:
+def metric_source(options: RemeshOptions, surface: Surface, prescribed: MetricSource | None) -> MetricSource:
     """Return the metric source that the options name.
 
     Parameters
@@ -85,9 +84,11 @@ def metric_source(options: RemeshOptions, surface: Surface, tensors: PointTensor
         The options.
     surface
         The prepared input: noise is never removed from a designed surface.
-    tensors
-        Tensors at the points that the source will be called with (V, 3, 3), if the options prescribe them.
+    prescribed
+        The source of a metric that the options prescribe at the points of the input.
     """
+    if prescribed is not None:
+        return prescribed
     metric, name = options.metric, embedding_name(options)
     if not callable(metric):
         if name in ("neural", "hybrid"):
@@ -95,8 +96,6 @@ def metric_source(options: RemeshOptions, surface: Surface, tensors: PointTensor
             metric = Hybrid(*given, options.feature_angle) if name == "hybrid" else Neural(*given)
         elif name == "filtered":
             metric = Filtered(options.denoise, options.feature_angle)
-        elif tensors is not None:
-            return PrecomputedTensors(tensors)
         else:
             return _BUILT_IN[str(metric)](options.feature_angle)
     if isinstance(metric, Neural | Filtered):
@@ -108,7 +107,7 @@ def metric_source(options: RemeshOptions, surface: Surface, tensors: PointTensor
 def embedder(options: RemeshOptions) -> Embedder:
     """Return the embedder that the options name."""
     if isinstance(options.embedding, str):
-        return Direct(iterations=options.embedding_iterations)
+        return Direct(iterations=options.embedding_iterations, unfolded=prescribes_sizes(options))
     return options.embedding
 
 

@@ -159,7 +159,7 @@ def test_values_that_are_no_metric_are_refused(run, square, values, words):
 @pytest.mark.parametrize(
     ("more", "words"),
     [
-        (["--metric", "curvature"], "--metric and --metric-file both say what the metric is"),
+        (["--metric", "curvature"], "--metric and --metric-file say what the metric is"),
         (["--edge-length", "2%"], "--edge-length 2%: in the metric of a file it is a number"),
         (["-n", 50, "--ratio", 0.1], "give one of -n"),
         (["--save-metric", "none/m.sol"], "the folder none does not exist"),

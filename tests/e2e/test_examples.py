@@ -25,7 +25,7 @@ def stretch_along_z():
 
 
 def test_every_example_is_tested():
-    tested = {"remesh_a_surface", "own_metric", "gallery", "noisy_scan", "carry_data"}
+    tested = {"remesh_a_surface", "own_metric", "gallery", "noisy_scan", "carry_data", "adapt_to_a_solution"}
     tutorials = {"own_metric_source", "own_energy", "own_embedder", "stages", "learn_a_metric"}
     assert {path.stem for path in FOLDER.glob("*.py")} == tested | tutorials
 
@@ -137,3 +137,12 @@ def test_carry_data_loses_nothing(capsys):
     load = result.mesh.regions["group"].labels == 6
     assert abs(result.surface.face_areas[load].sum() - 1.0) < 1e-9
     assert "area 1.000000 (1 before)" in capsys.readouterr().out
+
+
+@pytest.mark.slow
+def test_adapting_to_a_solution_lowers_its_error_at_the_same_number_of_vertices(tmp_path, capsys):
+    even, *adapted = example("adapt_to_a_solution").main(str(tmp_path / "adapted.png"), n_vertices=400)
+    assert adapted[0] < even / 2.5
+    assert adapted[1] < even / 4
+    assert capsys.readouterr().out.count("400 vertices") == 3
+    assert (tmp_path / "adapted.png").stat().st_size > 10_000

@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 
 import anisomesh
+from anisomesh.denoise.noise import with_noise
 from anisomesh.errors import OptionError
 from anisomesh.evaluation.report import evaluate
 from anisomesh.learn.architecture import NetworkOptions
@@ -15,7 +16,6 @@ from anisomesh.learn.inference.predict import NOISE_FLOOR, predict
 from anisomesh.learn.inference.pretrained import pretrained_networks, weights_path
 from anisomesh.learn.inference.stretch import StretchInference
 from anisomesh.learn.weights_file import read_weights
-from anisomesh.mesh.noise import with_noise
 from anisomesh.mesh.surface import Surface
 from anisomesh.repair.prepare import prepare
 from anisomesh.shapes.analytic import box, ellipsoid, sphere, torus, twisted_ring

@@ -6,7 +6,7 @@ import trimesh
 
 from anisomesh.denoise.classical import NOISE_GATE, classically_denoised, estimated_noise
 from anisomesh.denoise.filters import bilateral_filtered, neighbour_averages, taubin_smoothed
-from anisomesh.mesh.noise import with_noise
+from anisomesh.denoise.noise import with_noise
 from anisomesh.mesh.surface import Surface
 from anisomesh.shapes.analytic import box, open_patch, sphere, torus
 

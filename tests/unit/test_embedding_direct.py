@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from anisomesh.embedding.base import EmbeddingStatus, achieved_stretch, target_stretch
-from anisomesh.embedding.direct import embed
+from anisomesh.embedding.direct import Start, embed
 from anisomesh.embedding.gradient import face_frames, face_gradient, face_tensors
 from anisomesh.errors import OptionError
 from anisomesh.mesh.geometry import unit_frame
@@ -83,7 +83,7 @@ def test_paper_metric_keeps_the_coordinates_unscaled():
 @pytest.mark.parametrize("extra", [3, 4, 5, 8])
 def test_uniform_metric_needs_no_extra_coordinates_but_keeps_the_shape(extra):
     surface = box(n=3)
-    embedding = embed(surface, 4.0 * uniform_metric(surface), extra_dimensions=extra)
+    embedding = embed(surface, 4.0 * uniform_metric(surface), start=Start(extra))
     assert embedding.status is EmbeddingStatus.EXACT
     assert (embedding.iterations, embedding.residual) == (0, 0.0)
     assert embedding.points.shape == (surface.n_points, 3 + extra)
@@ -145,7 +145,7 @@ def test_target_stretch_is_the_ratio_of_the_eigenvalues_in_the_plane():
     np.testing.assert_allclose(target_stretch(face_tensors(surface, tensors, face_frames(surface))), 3.0)
 
 
-@pytest.mark.parametrize("options", [{"extra_dimensions": 2}, {"max_iterations": 0}, {"tolerance": -1.0}])
+@pytest.mark.parametrize("options", [{"start": Start(2)}, {"max_iterations": 0}, {"tolerance": -1.0}])
 def test_options_out_of_range_are_refused(options):
     surface = sphere(1)
     with pytest.raises(OptionError, match=next(iter(options))):

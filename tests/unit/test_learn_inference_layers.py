@@ -9,6 +9,7 @@ import pytest
 torch = pytest.importorskip("torch")
 
 from anisomesh._kernels.products import add_product  # noqa: E402
+from anisomesh.denoise.noise import with_noise  # noqa: E402
 from anisomesh.learn.architecture import NORMS, SKIPS, NetworkOptions, PaperOptions  # noqa: E402
 from anisomesh.learn.graphs.hierarchy import graph_hierarchy  # noqa: E402
 from anisomesh.learn.inference.layers import sums_at_nodes  # noqa: E402
@@ -21,7 +22,6 @@ from anisomesh.learn.models.checkpoint import load_weights, save_weights  # noqa
 from anisomesh.learn.models.paper import PaperNetwork, paper_input  # noqa: E402
 from anisomesh.learn.models.stretch import StretchNetwork  # noqa: E402
 from anisomesh.learn.weights_file import WeightsError, read_safetensors, read_weights  # noqa: E402
-from anisomesh.mesh.noise import with_noise  # noqa: E402
 from anisomesh.mesh.surface import Surface  # noqa: E402
 from anisomesh.shapes.analytic import ellipsoid, open_patch, sphere, torus  # noqa: E402
 

@@ -5,6 +5,7 @@ import pytest
 
 torch = pytest.importorskip("torch")
 
+from anisomesh.denoise.noise import NOISES, with_noise  # noqa: E402
 from anisomesh.learn.architecture import NetworkOptions  # noqa: E402
 from anisomesh.learn.data.examples import stretch_example  # noqa: E402
 from anisomesh.learn.data.items import Item  # noqa: E402
@@ -15,7 +16,6 @@ from anisomesh.learn.models.stretch import ResidualBlock, StretchNetwork  # noqa
 from anisomesh.learn.training.config import TrainingOptions  # noqa: E402
 from anisomesh.learn.training.losses import line_loss, offset_loss  # noqa: E402
 from anisomesh.learn.training.tasks import StretchTask  # noqa: E402
-from anisomesh.mesh.noise import NOISES, with_noise  # noqa: E402
 from anisomesh.mesh.surface import Surface  # noqa: E402
 from anisomesh.metric.curvature import principal_curvatures  # noqa: E402
 from anisomesh.metric.line_field import (  # noqa: E402

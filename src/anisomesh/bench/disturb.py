@@ -6,9 +6,9 @@ import zlib
 
 import numpy as np
 
+from anisomesh.denoise.noise import with_noise
 from anisomesh.errors import OptionError
 from anisomesh.learn.data.retriangulate import with_random_triangles
-from anisomesh.mesh.noise import with_noise
 from anisomesh.mesh.surface import Surface
 from anisomesh.pipeline import remesh
 

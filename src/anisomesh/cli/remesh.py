@@ -19,7 +19,7 @@ from anisomesh.cli.arguments import (
     target_option,
 )
 from anisomesh.cli.job import STANDARD_STREAM, Outputs, check_input_format, default_output, read_mesh, run_remesh
-from anisomesh.cli.metric_file import MetricFile, check_beside_metric_file, path_of
+from anisomesh.cli.prescribed_metric import file_of, prescribed_metric
 from anisomesh.cli.progress import progress
 from anisomesh.cli.report import as_json, hints, summary
 
@@ -98,6 +98,22 @@ def command(
             "of .vtu, .vtp, .ply, .msh. Enough without a number of vertices, which then follows.",
         ),
     ] = None,
+    adapt_to: Annotated[
+        str | None,
+        _input(
+            metavar="[FILE:]FIELD",
+            help="Adapt the mesh to this field at the vertices of IN, or of another mesh of the surface: small and "
+            "stretched triangles where the field bends. With -n or --ratio.",
+        ),
+    ] = None,
+    norm: Annotated[
+        str | None,
+        _input(
+            metavar="P",
+            help="With --adapt-to: the L^p norm in which the error is to be small, a number of at least 1, or inf.",
+            show_default="2",
+        ),
+    ] = None,
     weld: Annotated[
         str | None,
         _input(
@@ -134,8 +150,7 @@ def command(
         raise typer.BadParameter(
             "give one of -n (number of vertices), --ratio, --max-error and --edge-length, or --metric-file"
         )
-    if metric_file is not None:
-        check_beside_metric_file(context, edge_length)
+    prescribed = prescribed_metric(context, metric_file, adapt_to, norm, edge_length=edge_length, max_error=max_error)
     length = None if edge_length is None else Length.parse(edge_length, "--edge-length")
     error = None if max_error is None else Length.parse(max_error, "--max-error")
     gap = None if weld in (None, "auto") else Length.parse(weld, "--weld")
@@ -146,7 +161,7 @@ def command(
         raise typer.BadParameter("-o - and --json both write to standard output; use --report FILE")
     weights = options.get("weights")
     check_input_format(source, input_format)
-    others = features, density, keep_points, None if weights is None else Path(weights), path_of(metric_file)
+    others = features, density, keep_points, None if weights is None else Path(weights), file_of(prescribed)
     outputs.check(None if source == STANDARD_STREAM else source, *others)
     files = {"features": features, "keep_points": keep_points, "density": density}
     if any(path is not None for path in files.values()):
@@ -155,7 +170,6 @@ def command(
         readers = {"features": load_pairs, "keep_points": load_points, "density": load_numbers}
         options |= {name: readers[name](path) for name, path in files.items() if path is not None}
     options["lock"] = lock or None
-    prescribed = None if metric_file is None else MetricFile.read(metric_file)
     with progress(quiet) as display:
         mesh, seconds = read_mesh(source, input_format)
         _check_tables(mesh.surface, options, features, density)
@@ -166,12 +180,12 @@ def command(
             options["weld_tolerance"] = "auto" if gap is None else gap.on(mesh.surface)
         if prescribed is not None:
             display.note(prescribed.description)
-            options |= prescribed.options_for(mesh.surface, str(source))
+            options |= prescribed.options_for(mesh, str(source), options["feature_angle"])
         result, facts = run_remesh(mesh, display, name=str(source), load_seconds=seconds, **options)
         facts["hints"] = hints(result.prepared)
         facts["options"] |= {name: None if path is None else str(path) for name, path in files.items()}
         if prescribed is not None:
-            facts["options"] |= {"metric": None, "size_field": None, "metric_file": metric_file}
+            facts["options"] |= prescribed.facts
         outputs.write(result, facts, display)
     if json_:
         typer.echo(as_json(facts))

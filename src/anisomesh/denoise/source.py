@@ -5,8 +5,8 @@ from __future__ import annotations
 from dataclasses import dataclass, replace
 
 from anisomesh.denoise.classical import classically_denoised
+from anisomesh.denoise.noise import noise_height
 from anisomesh.errors import OptionError
-from anisomesh.mesh.noise import noise_height
 from anisomesh.mesh.surface import Surface
 from anisomesh.metric.field import MetricField
 from anisomesh.metric.sources import Curvature

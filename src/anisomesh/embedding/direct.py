@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass
+
 import numpy as np
 
 from anisomesh._arrays import CornerTensors, EmbeddedPoints, PointScalars, PointTensors
@@ -20,12 +22,44 @@ _MAX_EXTENT = 1e4  # diagonals times the largest root of the metric that coordin
 _MIN_ROOT_EIGENVALUE = 1e-12  # of T_f - c^2 I, over the largest of T_f: smaller ones are rounding errors, set to 0
 
 
+@dataclass(frozen=True)
+class Start:
+    """What the extra coordinates of an embedding start with.
+
+    Parameters
+    ----------
+    dimensions
+        Number of extra coordinates, at least 3.
+    unfolded
+        Whether they start with the surface itself in place of normals and sizes.
+
+    Notes
+    -----
+    Where sizes vary a lot, the usual start folds the surface: the sizes are the same on both sides of a layer of small
+    triangles, so the volume factor has its ridge there, and the two sides come to lie on each other, though each of
+    them has the right lengths. Cells would then reach from one side to the other. Started from the surface itself it
+    stays unfolded, with a larger residual where sizes vary in two directions.
+    """
+
+    dimensions: int = 5
+    unfolded: bool = False
+
+    def coordinates(self, surface: Surface, tensors: PointTensors, gradient: FaceGradient) -> EmbeddedPoints:
+        """Return the start (V, dimensions) of the extra coordinates."""
+        if self.unfolded:
+            return np.pad(surface.points, ((0, 0), (0, self.dimensions - 3)))
+        return initial_coordinates(surface, tensors, gradient, self.dimensions)
+
+
+DEFAULT_START = Start()
+
+
 def embed(
     surface: Surface,
     tensors: PointTensors,
     *,
     corner_tensors: CornerTensors | None = None,
-    extra_dimensions: int = 5,
+    start: Start = DEFAULT_START,
     max_iterations: int = 10,
     tolerance: float = 1e-3,
 ) -> Embedding:
@@ -39,8 +73,8 @@ def embed(
         Symmetric positive definite metric (V, 3, 3).
     corner_tensors
         The metric at the corners of the faces (F, 3, 3, 3) if it jumps between faces.
-    extra_dimensions
-        Number of extra coordinates, at least 3.
+    start
+        Number of extra coordinates, and what they start with.
     max_iterations
         Largest number of local/global steps.
     tolerance
@@ -49,12 +83,12 @@ def embed(
     Returns
     -------
     embedding
-        Points (V, 3 + extra_dimensions) and their agreement with the metric.
+        Points (V, 3 + start.dimensions) and their agreement with the metric.
 
     Raises
     ------
     OptionError
-        If ``extra_dimensions`` is below 3, ``max_iterations`` below 1, or ``tolerance`` negative.
+        If ``start.dimensions`` is below 3, ``max_iterations`` below 1, or ``tolerance`` negative.
 
     Notes
     -----
@@ -70,8 +104,8 @@ def embed(
     NASM, supplement A. Zhong, Wang, Levy, Hua, Guo, "Computing a high-dimensional Euclidean embedding from an
     arbitrary smooth Riemannian metric", 2018. Sorkine, Alexa, "As-rigid-as-possible surface modeling", 2007.
     """
-    if extra_dimensions < 3:
-        raise OptionError(f"extra_dimensions is {extra_dimensions}; expected at least 3, to start with the normals")
+    if start.dimensions < 3:
+        raise OptionError(f"the embedding has {start.dimensions} extra dimensions; expected at least 3 for its start")
     if max_iterations < 1 or tolerance < 0.0:
         raise OptionError(
             f"max_iterations is {max_iterations} and tolerance {tolerance}; expected at least 1 step and 0 or more"
@@ -80,11 +114,11 @@ def embed(
     metric = face_tensors(surface, tensors if corner_tensors is None else corner_tensors, gradient.frames)
     scale, root = _split(metric, gradient)
     if not root.any():
-        extra, residual, iterations = np.zeros((surface.n_points, extra_dimensions)), 0.0, 0
+        extra, residual, iterations = np.zeros((surface.n_points, start.dimensions)), 0.0, 0
         status = EmbeddingStatus.EXACT
     else:
-        start = initial_coordinates(surface, tensors, gradient, extra_dimensions)
-        extra, residual, iterations = _local_global(surface, gradient, root, start, max_iterations, tolerance)
+        first = start.coordinates(surface, tensors, gradient)
+        extra, residual, iterations = _local_global(surface, gradient, root, first, max_iterations, tolerance)
         limited = iterations == max_iterations
         status = EmbeddingStatus.ITERATION_LIMIT if limited else EmbeddingStatus.CONVERGED
     points = np.concatenate([scale * surface.points, extra], axis=1)

@@ -10,7 +10,7 @@ import numpy as np
 from anisomesh._arrays import real_array
 from anisomesh._values import real_number, whole_number
 from anisomesh.embedding.base import Embedding, EmbeddingStatus, StretchStatistics
-from anisomesh.embedding.direct import embed
+from anisomesh.embedding.direct import Start, embed
 from anisomesh.embedding.precomputed import precomputed_embedding
 from anisomesh.errors import OptionError
 from anisomesh.mesh.surface import Surface
@@ -37,6 +37,9 @@ class Direct:
         Number of coordinates besides the first three, at least 3.
     tolerance
         Stop when a step lowers the residual by less than this part of it.
+    unfolded
+        Whether the surface stays unfolded, for metrics whose sizes vary a lot; see
+        :class:`~anisomesh.embedding.direct.Start`.
 
     Raises
     ------
@@ -51,6 +54,7 @@ class Direct:
     iterations: int = 10
     extra_dimensions: int = 5
     tolerance: float = 1e-3
+    unfolded: bool = False
 
     def __post_init__(self) -> None:
         whole_number("iterations", self.iterations, 1)
@@ -66,7 +70,7 @@ class Direct:
             surface,
             field.tensors,
             corner_tensors=field.corner_tensors,
-            extra_dimensions=self.extra_dimensions,
+            start=Start(self.extra_dimensions, self.unfolded),
             max_iterations=self.iterations,
             tolerance=self.tolerance,
         )

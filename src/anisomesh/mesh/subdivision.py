@@ -3,17 +3,20 @@
 from __future__ import annotations
 
 import logging
+from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
 import numpy.typing as npt
 
-from anisomesh._arrays import EdgeMask, FaceIndices, FaceLabels
+from anisomesh._arrays import EdgeMask, FaceIndices, FaceLabels, Floats
 from anisomesh.errors import OptionError
 from anisomesh.mesh.surface import Surface
 from anisomesh.mesh.topology import edge_keys
 
 logger = logging.getLogger(__name__)
+
+_MAX_PASSES = 64  # each halves edges, so Euclidean lengths need fewer; a metric that grows with each pass does not end
 
 # Triangles that replace a face, by the number of its split sides. Nodes 0-2 are the corners of the face and 3-5 the
 # midpoints of the sides opposite them. The face is rotated so that the one split side, or the one whole side of two
@@ -57,7 +60,9 @@ class Subdivision:
         return np.asarray(np.einsum("vc,vc...->v...", self.barycentric, values[self.point_corners]))
 
 
-def split_long_edges(surface: Surface, max_length: float, *, max_faces: int) -> Subdivision:
+def split_long_edges(
+    surface: Surface, max_length: float, *, max_faces: int, lengths: Callable[[Surface], Floats] | None = None
+) -> Subdivision:
     """Split every edge longer than ``max_length`` at its midpoint until none is left.
 
     Parameters
@@ -69,6 +74,9 @@ def split_long_edges(surface: Surface, max_length: float, *, max_faces: int) -> 
     max_faces
         Upper bound on the number of faces of the result. If a pass would exceed it, only the longest edges are split
         and the result is not ``complete``.
+    lengths
+        What counts as the lengths of the edges (E,) of a subdivided surface, such as lengths in a metric; by default
+        their Euclidean lengths.
 
     Raises
     ------
@@ -87,10 +95,14 @@ def split_long_edges(surface: Surface, max_length: float, *, max_faces: int) -> 
     current = surface
     parent = np.arange(surface.n_faces, dtype=np.int32)
     weights = np.broadcast_to(np.eye(3), (surface.n_faces, 3, 3))
-    while (split := _edges_to_split(current, max_length, max_faces - current.n_faces)).any():
+    for _ in range(_MAX_PASSES):
+        long = current.edge_lengths if lengths is None else lengths(current)
+        split = _edges_to_split(current, long, max_length, max_faces - current.n_faces)
+        if not split.any():
+            break
         current, origin, weights = _split(current, weights, split)
         parent = parent[origin]
-    complete = not bool((current.edge_lengths > max_length).any())
+    complete = not bool((long > max_length).any())
     if not complete:
         logger.info("subdivision reached the limit of %d faces; some edges are longer than %g", max_faces, max_length)
     point_corners = np.repeat(np.arange(current.n_points, dtype=np.int32)[:, None], 3, axis=1)
@@ -125,12 +137,12 @@ def edges_within(subdivision: Subdivision, parent: Surface, edges: EdgeMask) -> 
     return np.asarray(fits & np.isin(edge_keys(ends), edge_keys(parent.edges[edges])))
 
 
-def _edges_to_split(surface: Surface, max_length: float, budget: int) -> EdgeMask:
+def _edges_to_split(surface: Surface, lengths: Floats, max_length: float, budget: int) -> EdgeMask:
     """Return which edges (E,) exceed the length; only the longest if splitting all would add more than ``budget``."""
-    split = surface.edge_lengths > max_length
+    split = lengths > max_length
     long = np.flatnonzero(split)
     if surface.edge_face_count[long].sum() > budget:
-        long = long[np.argsort(-surface.edge_lengths[long], kind="stable")]
+        long = long[np.argsort(-lengths[long], kind="stable")]
         split[long[np.cumsum(surface.edge_face_count[long]) > budget]] = False
     return split
 

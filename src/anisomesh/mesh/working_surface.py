@@ -6,12 +6,13 @@ so that the metric next to a crease would be averaged over the whole facet, and 
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
 import numpy.typing as npt
 
-from anisomesh._arrays import EdgeMask, PointLabels, PointMask
+from anisomesh._arrays import EdgeMask, Floats, PointLabels, PointMask
 from anisomesh.mesh.delaunay_refinement import Refinement, refine_slivers
 from anisomesh.mesh.geometry import even_edge_length
 from anisomesh.mesh.marked_surface import MarkedSurface
@@ -67,7 +68,14 @@ class WorkingSurface:
         return np.asarray(mask[self._kept])
 
 
-def working_surface(surface: Surface, n_vertices: int, *, creases: EdgeMask, tagged: EdgeMask) -> WorkingSurface:
+def working_surface(
+    surface: Surface,
+    n_vertices: int,
+    *,
+    creases: EdgeMask,
+    tagged: EdgeMask,
+    spacings: Callable[[Surface], Floats] | None = None,
+) -> WorkingSurface:
     """Return the surface without short edges, slivers and long edges, as far as the limit on its faces allows.
 
     Parameters
@@ -78,6 +86,9 @@ def working_surface(surface: Surface, n_vertices: int, *, creases: EdgeMask, tag
         Number of sites for which it is made; the surface moves by no more than a fifth of the square of their distance.
     creases, tagged
         Edges (E,) that stay in place; tagged ones are found again in the result.
+    spacings
+        If sites are spread unevenly, the lengths of the edges (E,) of a surface over the distance of sites along them:
+        they have the same bound as with evenly spread ones.
     """
     site_distance, metric_edge = (even_edge_length(surface.area, n) for n in (n_vertices, _METRIC_VERTICES))
     max_length = min(_MAX_EDGE_PER_SITE_DISTANCE * site_distance, _MAX_EDGE_PER_METRIC_EDGE * metric_edge)
@@ -102,7 +113,13 @@ def working_surface(surface: Surface, n_vertices: int, *, creases: EdgeMask, tag
         n_kept=coarsening.surface.n_points,
     )
     refined = trimmed.surface
-    subdivision = split_long_edges(refined, max_length, max_faces=max(max_faces, refined.n_faces))
+
+    def lengths(split: Surface) -> Floats:
+        if spacings is None:
+            return split.edge_lengths
+        return np.maximum(split.edge_lengths, max_length / _MAX_EDGE_PER_SITE_DISTANCE * spacings(split))
+
+    subdivision = split_long_edges(refined, max_length, max_faces=max(max_faces, refined.n_faces), lengths=lengths)
     return WorkingSurface(
         surface=subdivision.surface,
         tagged=edges_within(subdivision, refined, trimmed.marked.labels == _TAGGED),

@@ -57,7 +57,8 @@ class MetricSource(Protocol):
     """Anything that computes a metric on a surface.
 
     It is called with the prepared surface at bounding-box diagonal 1, long edges split, so that lengths and curvatures
-    do not depend on the units of the input.
+    do not depend on the units of the input. It is called several times, each time with edges split that are too long in
+    the metric of the last call.
     """
 
     def __call__(self, surface: Surface, /) -> MetricField:

@@ -1,4 +1,4 @@
-"""Metric sources that measure the surface or are precomputed."""
+"""Metric sources that measure the surface."""
 
 from __future__ import annotations
 
@@ -6,7 +6,6 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from anisomesh._arrays import PointTensors
 from anisomesh._values import real_number, whole_number
 from anisomesh.errors import OptionError
 from anisomesh.mesh.surface import Surface
@@ -19,7 +18,6 @@ from anisomesh.metric.tensors import (
     approximation_metric,
     curvature_metric,
     uniform_metric,
-    validate_metric,
 )
 
 _MAX_RADIUS = 50  # rings of edges; the time of a fit grows with the square
@@ -116,26 +114,3 @@ class Uniform:
     def __call__(self, surface: Surface) -> MetricField:
         """Return the metric at the points of a surface."""
         return MetricField(tensors=uniform_metric(surface))
-
-
-@dataclass(frozen=True, eq=False)
-class PrecomputedTensors:
-    """Tensors known beforehand at the points of the surface that the source is called with.
-
-    Parameters
-    ----------
-    tensors
-        Symmetric positive definite matrices (V, 3, 3).
-    """
-
-    tensors: PointTensors
-
-    def __call__(self, surface: Surface) -> MetricField:
-        """Return the metric at the points of a surface.
-
-        Raises
-        ------
-        MetricError
-            If the tensors are not symmetric positive definite, or not one per point.
-        """
-        return MetricField(tensors=validate_metric(self.tensors, surface))

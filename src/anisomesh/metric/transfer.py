@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 import numpy.typing as npt
@@ -11,7 +11,8 @@ from anisomesh._arrays import CornerTensors, FaceLabels, Faces, Points, PointTen
 from anisomesh.errors import MetricError
 from anisomesh.mesh.closest_points import ClosestPoints
 from anisomesh.mesh.surface import Surface
-from anisomesh.metric.field import MetricField
+from anisomesh.metric.field import MetricField, mean_at_points
+from anisomesh.metric.patches import smooth_patches
 from anisomesh.metric.tensors import metric_root
 
 _INSET = 0.1  # of the way from a corner to the barycentre: on its side of a crease also where a triangle is off it
@@ -80,6 +81,20 @@ def transfer_to_corners(reference: ClosestPoints, field: MetricField, surface: S
     corners = surface.points[surface.faces]
     inside = corners + _INSET * (corners.mean(axis=1, keepdims=True) - corners)
     return roots_near(reference, field, inside.reshape(-1, 3)).reshape(-1, 3, 3, 3)
+
+
+def field_near(reference: ClosestPoints, field: MetricField, surface: Surface, crease_angle: float) -> MetricField:
+    """Return the metric field on a surface near a reference that has a metric field.
+
+    Where the field jumps across creases, the patches are bounded by the edges of the surface that bend by more degrees
+    than ``crease_angle``.
+    """
+    roots = transfer_to_corners(reference, field, surface)
+    tensors = roots @ roots
+    if field.corner_tensors is None:
+        return replace(field, tensors=tensors)
+    patch = smooth_patches(surface, crease_angle, 1).labels
+    return replace(field, tensors=mean_at_points(surface, tensors), corner_tensors=tensors, patch=patch)
 
 
 def roots_near(reference: ClosestPoints, field: MetricField, places: Points) -> PointTensors:

@@ -16,10 +16,12 @@ from anisomesh.errors import MetricError, OptionError
 from anisomesh.features.detect import sharp_edges
 from anisomesh.features.tagged import tagged_edges
 from anisomesh.junctions.cut import Junctions, cut_at_junctions
+from anisomesh.mesh.closest_points import ClosestPoints
 from anisomesh.mesh.geometry import Frame, even_edge_length
 from anisomesh.mesh.surface import Surface
 from anisomesh.meshops.anchors import Anchors, places_found
 from anisomesh.metric.sizes import checked_sizes
+from anisomesh.metric.solution.source import SolutionMetric, checked_values
 from anisomesh.metric.tensors import validate_metric
 from anisomesh.options import MIN_VERTICES, RemeshOptions
 from anisomesh.repair.carried_data import without_t_junctions
@@ -29,6 +31,7 @@ from anisomesh.resolve import follows_creases, is_designed
 from anisomesh.setup.fixed import with_fixed_points
 
 _MAX_BORDER_SHARE = 0.4  # of the vertices asked for, that borders and seams may take; heuristic
+_MAX_MEAN_DISTANCE = 0.05  # of the input from the surface of a solution, over the diagonal: another one is a mistake
 _LARGEST_DENSITY = 1e30  # and inverse of the smallest, so that energies are far from overflow
 
 
@@ -52,6 +55,8 @@ class PreparedInput:
         Where sheets are to be joined, None if nowhere.
     tensors, density
         Metric (V, 3, 3) and density (V,) at its points, None if they are not prescribed.
+    solution
+        The function to which the mesh is adapted, on a repaired surface, None if there is none.
     sizes
         Lengths of edges at its points (V,), None if there are none or they are a function.
     tagged
@@ -71,6 +76,7 @@ class PreparedInput:
     junctions: Junctions | None
     tensors: PointTensors | None
     density: PointScalars | None
+    solution: SolutionMetric | None
     sizes: PointScalars | None
     tagged: EdgeMask
     borders: EdgeMask
@@ -153,7 +159,8 @@ def prepared_input(mesh: Mesh, options: RemeshOptions, *, joined: bool = True) -
     MeshError
         If nothing is left of the surface after the repair.
     MetricError
-        If prescribed tensors are not symmetric positive definite, one per point of the input.
+        If prescribed tensors are not symmetric positive definite, one per point of the input, or there is not one value
+        of a solution per point.
     OptionError
         If densities or sizes are not positive, one per point, features are not edges of the input, or points to keep
         are not points of it.
@@ -197,6 +204,7 @@ def prepared_input(mesh: Mesh, options: RemeshOptions, *, joined: bool = True) -
         junctions=junctions,
         tensors=tensors,
         density=density,
+        solution=_solution(options.metric, surface, prepared) if isinstance(options.metric, SolutionMetric) else None,
         sizes=sizes,
         tagged=tagged,
         borders=borders,
@@ -212,6 +220,21 @@ def with_split_sides(mesh: Mesh, report: PrepareReport, options: RemeshOptions) 
     if mesh.is_bare or not (report.sides_split or report.faces_degenerate):
         return mesh
     return without_t_junctions(mesh, weld_distance(mesh.surface, options.weld_tolerance))
+
+
+def _solution(metric: SolutionMetric, surface: Surface, prepared: Prepared) -> SolutionMetric:
+    """Return the metric of a solution on a repaired surface: the prepared one, or the one that the metric has."""
+    if metric.surface is None:
+        values = checked_values(metric.values, surface.n_points)[prepared.point_source]
+        return replace(metric, values=values, surface=prepared.surface)
+    own = prepare(metric.surface)
+    distance = np.sqrt(ClosestPoints(own.surface).squared_distances(prepared.surface.points)).mean()
+    if distance > _MAX_MEAN_DISTANCE * prepared.surface.diagonal:
+        raise MetricError(
+            f"the surface of the solution is {distance:.3g} from the points of the input on average, "
+            f"{distance / prepared.surface.diagonal:.0%} of the diagonal; expected a mesh of the same surface"
+        )
+    return replace(metric, values=checked_values(metric.values)[own.point_source], surface=own.surface)
 
 
 def _tagged(

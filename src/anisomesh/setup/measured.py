@@ -4,26 +4,29 @@ from __future__ import annotations
 
 import logging
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+from functools import partial
 from typing import Any, cast
 
 import numpy as np
 
-from anisomesh._arrays import EdgeMask, PointMask, PointTensors, real_array
+from anisomesh._arrays import EdgeMask, Floats, PointMask, real_array
 from anisomesh.errors import OptionError
 from anisomesh.execution.memory import check_memory
 from anisomesh.execution.run import Run
 from anisomesh.features.detect import WEAK_ANGLE, apexes, sharp_edges
 from anisomesh.features.smooth_lines import with_smooth_lines
+from anisomesh.mesh.closest_points import ClosestPoints
 from anisomesh.mesh.geometry import Frame, unit_frame
 from anisomesh.mesh.surface import Surface
 from anisomesh.mesh.working_surface import WorkingSurface, working_surface
 from anisomesh.metric.conformity import MetricExtent
-from anisomesh.metric.field import MetricField, checked_field
+from anisomesh.metric.field import MetricField, MetricSource, checked_field
 from anisomesh.metric.narrow_patches import limit_to_patches
 from anisomesh.metric.sizes import checked_sizes, limited_sizes, metric_of_sizes
+from anisomesh.metric.transfer import field_near
 from anisomesh.options import MIN_VERTICES, RemeshOptions
-from anisomesh.resolve import follows_creases, is_designed, metric_source, with_embedding_chosen
+from anisomesh.resolve import follows_creases, is_designed, metric_source, prescribes_sizes, with_embedding_chosen
 from anisomesh.setup.inputs import PreparedInput
 
 logger = logging.getLogger(__name__)
@@ -106,15 +109,16 @@ def measure(source: PreparedInput, n: int, options: RemeshOptions, run: Run) -> 
         surface, tagged = _with_smooth_borders(surface, source, followed.edges, options.feature_angle)
         creases = sharp_edges(surface, min(options.feature_angle, WEAK_ANGLE))
         creases |= source.fixed[surface.edges].any(axis=1)  # so that the points stay
-        split = working_surface(surface, n, creases=creases, tagged=tagged)
+        metric = metric_source(options, surface, _prescribed(source, surface, frame, options))
+        spacings = partial(_spacings, metric, n) if prescribes_sizes(options) else None
+        split = working_surface(surface, n, creases=creases, tagged=tagged, spacings=spacings)
         tips = split.on_coarse(source.fixed)
         if follows_creases(options):
             tips |= apexes(split.coarse, sharp_edges(split.coarse, options.feature_angle))
         check_memory(n, split.surface.n_faces)
         logger.info("working surface: %r; embedding: %s", split.surface, options.embedding)
     with run.stage("metric"):
-        tensors = _prescribed(source, split, frame, options)
-        field = checked_field(metric_source(options, surface, tensors)(split.surface), split.surface)
+        field = checked_field(metric(split.surface), split.surface)
         working = split.surface
         if field.points is not None:
             kept = np.flatnonzero(split.on_coarse(source.fixed))
@@ -155,26 +159,47 @@ def _with_smooth_borders(
     return surface, lines | tagged
 
 
-def _prescribed(
-    source: PreparedInput, split: WorkingSurface, frame: Frame, options: RemeshOptions
-) -> PointTensors | None:
-    """Return the tensors at the points of the working surface (V, 3, 3) that a user prescribes, None for others."""
+def _spacings(metric: MetricSource, n: int, surface: Surface) -> Floats:
+    """Return the lengths of the edges (E,) of a surface in a metric over the distance of n vertices in it."""
+    field = checked_field(metric(surface), surface)
+    along = surface.points[surface.edges[:, 1]] - surface.points[surface.edges[:, 0]]
+    squared = np.einsum("ex,ekxy,ey->ek", along, field.tensors[surface.edges], along)
+    return np.asarray(np.sqrt(squared.max(axis=1)) / MetricExtent.of(surface, field).length(n))
+
+
+def _prescribed(source: PreparedInput, surface: Surface, frame: Frame, options: RemeshOptions) -> MetricSource | None:
+    """Return the metric that a user prescribes at the points of the input, on surfaces near it; None for others.
+
+    ``surface`` is the prepared surface at bounding-box diagonal 1.
+    """
+    angle = options.feature_angle
+    if source.solution is not None:
+        given = cast(Surface, source.solution.surface)
+        given = given.with_points(frame.to_unit(given.points))
+        field = checked_field(replace(source.solution, surface=None)(given), given)
+        return partial(field_near, ClosestPoints(given), field, crease_angle=angle)
     if source.tensors is not None:
-        return np.asarray(split.interpolate(source.tensors * frame.scale**2))
+        field = MetricField(tensors=source.tensors * frame.scale**2)
+        return partial(field_near, ClosestPoints(surface), field, crease_angle=angle)
     if options.size_field is None:
         return None
-    surface = split.surface
-    if source.sizes is not None:
-        sizes = split.interpolate(source.sizes)
-    else:
-        places, function = frame.to_model(surface.points), cast(Callable[..., Any], options.size_field)
-        sizes = real_array("size_field", function(places), (len(places),), OptionError)
-        sizes = checked_sizes(sizes, places)
-    low, high = (None if bound is None else bound / frame.scale for bound in (options.min_size, options.max_size))
-    sizes = limited_sizes(surface, sizes / frame.scale, low=low, high=high, gradation=options.gradation)
-    if sizes.min() > _MAX_SMALLEST_SIZE:
-        raise OptionError(
-            f"size_field is at least {sizes.min() * frame.scale:g} everywhere; expected lengths that fit the mesh, "
-            f"whose bounding-box diagonal is {frame.scale:.4g}"
-        )
-    return metric_of_sizes(sizes)
+    nearest = ClosestPoints(surface)
+
+    def sizes_on(working: Surface) -> MetricField:
+        if source.sizes is not None:
+            faces, weights = nearest.locate(working.points)
+            sizes = np.einsum("nc,nc->n", weights, source.sizes[surface.faces[faces]])
+        else:
+            places, function = frame.to_model(working.points), cast(Callable[..., Any], options.size_field)
+            sizes = real_array("size_field", function(places), (len(places),), OptionError)
+            sizes = checked_sizes(sizes, places)
+        low, high = (None if bound is None else bound / frame.scale for bound in (options.min_size, options.max_size))
+        sizes = limited_sizes(working, sizes / frame.scale, low=low, high=high, gradation=options.gradation)
+        if sizes.min() > _MAX_SMALLEST_SIZE:
+            raise OptionError(
+                f"size_field is at least {sizes.min() * frame.scale:g} everywhere; expected lengths that fit the mesh, "
+                f"whose bounding-box diagonal is {frame.scale:.4g}"
+            )
+        return MetricField(tensors=metric_of_sizes(sizes))
+
+    return sizes_on

@@ -8,10 +8,10 @@ import numpy as np
 import torch
 from torch import Tensor
 
+from anisomesh.denoise.noise import Noise, with_noise
 from anisomesh.learn.data.items import Item
 from anisomesh.learn.graphs.hierarchy import GraphHierarchy, graph_hierarchy
 from anisomesh.mesh.geometry import sums_at_points
-from anisomesh.mesh.noise import Noise, with_noise
 from anisomesh.metric.line_field import line_field_components, principal_stretch
 
 _UNTRUSTED_WEIGHT = 0.1  # heuristic: weight, over the area, of points whose measured curvature is not reliable
@@ -69,7 +69,7 @@ def stretch_example(
     rng
         Random numbers of the noise; None for none.
     kind
-        See :func:`anisomesh.mesh.noise.with_noise`.
+        See :func:`anisomesh.denoise.noise.with_noise`.
     """
     clean = item.surface
     noisy = clean if rng is None else with_noise(clean, noise, rng, kind)

@@ -11,6 +11,7 @@ import numpy as np
 
 from anisomesh._arrays import EmbeddedPoints, Points, PointTensors
 from anisomesh.denoise.filters import bilateral_filtered
+from anisomesh.denoise.noise import noise_height
 from anisomesh.embedding.precomputed import pulled_back_metric
 from anisomesh.learn import require_torch
 from anisomesh.learn.architecture import PaperOptions
@@ -19,7 +20,6 @@ from anisomesh.learn.inference.paper import PaperInference
 from anisomesh.learn.inference.pretrained import weights_path
 from anisomesh.learn.inference.stretch import StretchInference
 from anisomesh.learn.weights_file import WeightsError, read_weights
-from anisomesh.mesh.noise import noise_height
 from anisomesh.mesh.surface import Surface
 from anisomesh.metric.line_field import tensors_of_line_field
 

@@ -10,6 +10,7 @@ import numpy as np
 import torch
 from torch import Tensor, nn
 
+from anisomesh.denoise.noise import NOISES, with_noise
 from anisomesh.learn.architecture import NetworkOptions, PaperOptions
 from anisomesh.learn.data.examples import StretchExample, stretch_example
 from anisomesh.learn.data.items import Item
@@ -25,7 +26,6 @@ from anisomesh.learn.training.losses import (
     line_loss,
     offset_loss,
 )
-from anisomesh.mesh.noise import NOISES, with_noise
 from anisomesh.mesh.surface import Surface
 
 N_SYMMETRIES = 10
