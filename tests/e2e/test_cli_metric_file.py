@@ -105,6 +105,24 @@ def test_the_command_line_and_python_do_the_same(run, square):
         anisomesh.remesh(SQUARE, metric=tensors, density=np.ones(SQUARE.n_points))
 
 
+def test_sizes_of_a_file_are_limited_as_in_python(run, tmp_path):
+    sizes = np.where(SQUARE.points[:, 0] > 0.5, 0.05, 0.4)
+    save(SQUARE, tmp_path / "in.vtu", point_data={"h": sizes})
+    limits = ("--min-size", 0.1, "--max-size", "20%", "--gradation", 0.5)
+    assert run("remesh", "in.vtu", "-o", "out.ply", "--metric-file", "in.vtu:h", *limits, *FAST).returncode == 0
+    same = anisomesh.remesh(
+        tmp_path / "in.vtu",
+        metric="uniform",
+        size_field=sizes,
+        min_size=0.1,
+        max_size=0.2 * SQUARE.diagonal,
+        gradation=0.5,
+        max_iterations=2,
+        fit=False,
+    )
+    np.testing.assert_array_equal(same.surface.points, load(tmp_path / "out.ply").points)
+
+
 @pytest.mark.parametrize("tensors", [True, False], ids=["tensors", "sizes"])
 def test_rows_belong_to_the_points_of_the_file_before_its_repair(run, tmp_path, tensors):
     """Unused and repeated points of the input, which the repair removes, have rows too."""
@@ -162,6 +180,8 @@ def test_values_that_are_no_metric_are_refused(run, square, values, words):
         (["--metric", "curvature"], "--metric and --metric-file say what the metric is"),
         (["--edge-length", "2%"], "--edge-length 2%: in the metric of a file it is a number"),
         (["-n", 50, "--ratio", 0.1], "give one of -n"),
+        (["--min-size", "1%", "--gradation", 0.3], "--min-size and --gradation: there are no sizes to limit"),
+        (["--max-size", "x"], "--max-size"),
         (["--save-metric", "none/m.sol"], "the folder none does not exist"),
         (["--save-metric", "m.stl"], "--save-metric m.stl: expected a file name ending in .sol, .npy, .vtu"),
         (["--save-metric", "in.sol"], "in.sol is an input and would be overwritten"),

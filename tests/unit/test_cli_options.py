@@ -12,9 +12,6 @@ from anisomesh.options import RemeshOptions
 PYTHON_ONLY = {
     "energy": "an object with functions",
     "size_field": "an array or a function",
-    "min_size": "for a size_field",
-    "max_size": "for a size_field",
-    "gradation": "for a size_field",
 }
 OTHER_NAMES = {"weld_tolerance": "weld"}
 COMMAND = typer.main.get_command(app).commands["remesh"]

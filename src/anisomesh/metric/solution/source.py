@@ -21,7 +21,7 @@ from anisomesh.metric.tangent import tangent_frames, unit_normals
 from anisomesh.metric.transfer import field_near
 
 _RINGS = 2  # of the neighbourhoods of the fit; creases shorter than that do not separate them
-_ROUNDING = 1e-12  # second differences over the largest value, below which they are rounding: 1e-16 times sums
+_SUM_ROUNDING = 1e-12  # second differences over the largest value, below which they are rounding: 1e-16 times sums
 _SMALLEST = 1e-12  # eigenvalue of a Hessian, over the largest one; its logarithm is averaged
 _SMOOTHING = 1  # one-ring averages of the logarithm of the metric: recovered derivatives are noisy; heuristic
 _FLOOR_ROUNDS = 100  # of the bound on the size, which converges linearly with the factor 1 / max_size^2
@@ -102,7 +102,9 @@ class SolutionMetric:
         patches = smooth_patches(surface, self.crease_angle, _RINGS)
         hessians = recovered_hessians(patches.surface, values[patches.source])
         largest = float(np.abs(np.linalg.eigvalsh(hessians)).max(initial=0.0))
-        if largest * surface.diagonal**2 <= _ROUNDING * float(np.abs(values).max(initial=0.0)) * _cells(surface):
+        if largest * surface.diagonal**2 <= _SUM_ROUNDING * float(np.abs(values).max(initial=0.0)) * _cells(
+            surface
+        ):
             remark = "the values have no second derivatives beyond rounding, so the mesh is not adapted to them"
             return MetricField(tensors=np.tile(np.eye(3), (surface.n_points, 1, 1)), remarks=(remark,))
         return patches.field(

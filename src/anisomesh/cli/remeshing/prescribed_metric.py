@@ -57,6 +57,19 @@ def prescribed_metric(
     return AdaptTo.parse(adapt_to, norm or _DEFAULT_NORM)
 
 
+def check_limits(prescribed: MetricFile | AdaptTo | None, options: list[str]) -> None:
+    """Check that options that limit sizes have sizes to limit.
+
+    Raises
+    ------
+    typer.BadParameter
+        If there are such options and no sizes of a file.
+    """
+    if options and not (isinstance(prescribed, MetricFile) and prescribed.field.kind == "scalar"):
+        names = " and ".join(options)
+        raise typer.BadParameter(f"{names}: there are no sizes to limit; give a --metric-file with lengths of edges")
+
+
 def file_of(prescribed: MetricFile | AdaptTo | None) -> Path | None:
     """Return the file that a metric is read from, None for none."""
     return None if prescribed is None else prescribed.file

@@ -15,12 +15,13 @@ from anisomesh.cli.arguments import (
     Ratio,
     Source,
     Vertices,
+    positive,
     takes_remesh_options,
     target_option,
 )
 from anisomesh.cli.job import STANDARD_STREAM, Outputs, check_input_format, default_output, read_mesh, run_remesh
-from anisomesh.cli.prescribed_metric import file_of, prescribed_metric
 from anisomesh.cli.progress import progress
+from anisomesh.cli.remeshing.prescribed_metric import check_limits, file_of, prescribed_metric
 from anisomesh.cli.report import as_json, hints, summary
 
 if TYPE_CHECKING:
@@ -98,6 +99,21 @@ def command(
             "of .vtu, .vtp, .ply, .msh. Enough without a number of vertices, which then follows.",
         ),
     ] = None,
+    min_size: Annotated[
+        str | None,
+        _input(metavar="LENGTH", help="With sizes of --metric-file: raise smaller ones to this, such as 0.2 or 1%."),
+    ] = None,
+    max_size: Annotated[
+        str | None, _input(metavar="LENGTH", help="With sizes of --metric-file: lower larger ones to this.")
+    ] = None,
+    gradation: Annotated[
+        float | None,
+        _input(
+            callback=positive,
+            metavar="X",
+            help="With sizes of --metric-file: the most that they differ by over a distance of 1; larger are lowered.",
+        ),
+    ] = None,
     adapt_to: Annotated[
         str | None,
         _input(
@@ -151,9 +167,18 @@ def command(
             "give one of -n (number of vertices), --ratio, --max-error and --edge-length, or --metric-file"
         )
     prescribed = prescribed_metric(context, metric_file, adapt_to, norm, edge_length=edge_length, max_error=max_error)
-    length = None if edge_length is None else Length.parse(edge_length, "--edge-length")
-    error = None if max_error is None else Length.parse(max_error, "--max-error")
-    gap = None if weld in (None, "auto") else Length.parse(weld, "--weld")
+    limits = {"--min-size": min_size, "--max-size": max_size, "--gradation": gradation}
+    check_limits(prescribed, [option for option, value in limits.items() if value is not None])
+    texts = {
+        "edge_length": edge_length,
+        "max_error": max_error,
+        "min_size": min_size,
+        "max_size": max_size,
+        "weld": None if weld == "auto" else weld,
+    }
+    lengths = {
+        name: Length.parse(text, f"--{name.replace('_', '-')}") for name, text in texts.items() if text is not None
+    }
     out = default_output(source, input_format, output_format) if out is None else out
     outputs = Outputs(mesh=out, mesh_format=output_format, report=report, rvd=rvd, metric=save_metric, picture=picture)
     to_stdout = out == STANDARD_STREAM
@@ -173,11 +198,10 @@ def command(
     with progress(quiet) as display:
         mesh, seconds = read_mesh(source, input_format)
         _check_tables(mesh.surface, options, features, density)
-        options |= {"n_vertices": n_vertices, "ratio": ratio}
-        options["max_error"] = None if error is None else error.on(mesh.surface)
-        options["edge_length"] = None if length is None else length.on(mesh.surface)
+        options |= {"n_vertices": n_vertices, "ratio": ratio, "gradation": gradation}
+        options |= {name: length.on(mesh.surface) for name, length in lengths.items()}
         if weld is not None:
-            options["weld_tolerance"] = "auto" if gap is None else gap.on(mesh.surface)
+            options["weld_tolerance"] = options.pop("weld", weld)
         if prescribed is not None:
             display.note(prescribed.description)
             options |= prescribed.options_for(mesh, str(source), options["feature_angle"])

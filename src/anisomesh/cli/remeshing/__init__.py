@@ -1,0 +1,1 @@
+"""``anisomesh remesh``: the command, and the metric that its options prescribe."""
