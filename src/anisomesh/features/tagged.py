@@ -120,7 +120,7 @@ def _checked_pairs(input_mesh: Surface, pairs: npt.ArrayLike) -> npt.NDArray[np.
 def distance_to_crease_edges(
     surface: Surface, tagged: EdgeMask, mesh: Surface, crease_edges: npt.NDArray[np.int64]
 ) -> float:
-    """Return the largest distance from tagged edges to edges of a mesh along creases; 0 if nothing is tagged.
+    """Return the largest distance from tagged edges to edges of a mesh on creases or its boundary, 0 if none is tagged.
 
     Parameters
     ----------
@@ -131,13 +131,19 @@ def distance_to_crease_edges(
     mesh
         A mesh near the surface, in the same units.
     crease_edges
-        Ends of the edges of the mesh along creases (n, 2); infinite if there are none.
+        Ends of the edges of the mesh along creases inside it (n, 2); infinite if there are none for edges inside.
     """
-    if not tagged.any():
+    boundary, outline = surface.edge_face_count == 1, mesh.edges[mesh.edge_face_count == 1]
+    lines = ((tagged & ~boundary, crease_edges), (tagged & boundary, outline))
+    return max(_largest_distance(surface.points[surface.edges[of]], mesh, edges) for of, edges in lines)
+
+
+def _largest_distance(ends: npt.NDArray[np.float64], mesh: Surface, edges: npt.NDArray[np.integer]) -> float:
+    """Return the largest distance of the ends and middles of segments (n, 2, 3) from edges (m, 2) of a mesh."""
+    if len(ends) == 0:
         return 0.0
-    if len(crease_edges) == 0:
+    if len(edges) == 0:
         return float("inf")
-    ends = surface.points[surface.edges[tagged]]
     places = np.concatenate([ends[:, 0], ends[:, 1], ends.mean(axis=1)])
-    squares, _, _ = igl.point_mesh_squared_distance(places, mesh.points, crease_edges)
+    squares, _, _ = igl.point_mesh_squared_distance(places, mesh.points, np.asarray(edges, dtype=np.int64))
     return float(np.sqrt(squares.max()))

@@ -35,6 +35,14 @@ _MAX_MEAN_DISTANCE = 0.05  # of the input from the surface of a solution, over t
 _LARGEST_DENSITY = 1e30  # and inverse of the smallest, so that energies are far from overflow
 
 
+class Lines(NamedTuple):
+    """Edges (E,) that are prescribed, on smooth borders between regions, and on smooth seams of corner data."""
+
+    tagged: EdgeMask
+    borders: EdgeMask
+    seams: EdgeMask
+
+
 class Followed(NamedTuple):
     """Edges (E,) to follow, what they are in words, and what has to be said about others, a sentence each."""
 
@@ -167,12 +175,20 @@ def prepared_input(mesh: Mesh, options: RemeshOptions, *, joined: bool = True) -
     """
     surface = mesh.surface
     prepared, fixed = with_fixed_points(mesh, prepare(surface, weld_tolerance=options.weld_tolerance), options)
-    junctions = cut_at_junctions(prepared, fixed) if joined else None
+    least, junctions, lines = int(np.count_nonzero(fixed)), None, _lines(mesh, prepared, options)
+    fixed = fixed | _ends(prepared.surface, lines.tagged)
+    if joined and prepared.junctions.any():
+        followed = lines.tagged | lines.borders | lines.seams
+        crossing = np.zeros_like(fixed)
+        crossing[prepared.surface.edges[followed & ~prepared.junctions]] = True
+        junctions = cut_at_junctions(prepared, fixed | crossing)
     if junctions is not None:
         sheets, source = junctions.sheets, prepared.point_source[junctions.source]
         none = np.zeros(len(sheets.edges), dtype=bool)
-        fixed = fixed[junctions.source] & ~junctions.added
+        fixed = (fixed[junctions.source] & ~junctions.added) | junctions.graph.nodes
         prepared = replace(prepared, surface=sheets, point_source=source, junctions=none)
+        inside = sheets.edge_face_count == 2  # junctions are boundaries, and followed as such
+        lines = Lines(*(edges & inside for edges in _lines(mesh, prepared, options)))
     tensors = density = None
     if options.has_tensors:
         given = _at_prepared("metric", options.metric, (surface.n_points, 3, 3), prepared, MetricError)
@@ -189,16 +205,6 @@ def prepared_input(mesh: Mesh, options: RemeshOptions, *, joined: bool = True) -
     if options.size_field is not None and not callable(options.size_field):
         given = _at_prepared("size_field", options.size_field, (surface.n_points,), prepared, OptionError)
         sizes = checked_sizes(given, prepared.surface.points, prepared.point_source)
-    prescribed = [mesh.features, *([] if options.features is None else [options.features])]
-    borders, seams = _borders(with_split_sides(mesh, prepared.report, options), prepared.surface, options)
-    tagged = _tagged(prescribed, surface, prepared.surface, options)
-    least = MIN_VERTICES
-    if options.keep_points is not None:
-        kept = np.flatnonzero(fixed) if junctions is None else np.unique(junctions.joined[fixed])
-        least = max(least, len(kept))
-    if junctions is not None:  # which are boundaries, and followed as such
-        inside = prepared.surface.edge_face_count == 2
-        tagged, borders, seams, fixed = tagged & inside, borders & inside, seams & inside, fixed | junctions.graph.nodes
     return PreparedInput(
         prepared=prepared,
         junctions=junctions,
@@ -206,11 +212,11 @@ def prepared_input(mesh: Mesh, options: RemeshOptions, *, joined: bool = True) -
         density=density,
         solution=_solution(options.metric, surface, prepared) if isinstance(options.metric, SolutionMetric) else None,
         sizes=sizes,
-        tagged=tagged,
-        borders=borders,
-        seams=seams,
+        tagged=lines.tagged,
+        borders=lines.borders,
+        seams=lines.seams,
         fixed=fixed,
-        least=least,
+        least=MIN_VERTICES if options.keep_points is None else max(MIN_VERTICES, least),
         outline=np.zeros(len(prepared.surface.edges), dtype=bool),
     )
 
@@ -235,6 +241,18 @@ def _solution(metric: SolutionMetric, surface: Surface, prepared: Prepared) -> S
             f"{distance / prepared.surface.diagonal:.0%} of the diagonal; expected a mesh of the same surface"
         )
     return replace(metric, values=checked_values(metric.values)[own.point_source], surface=own.surface)
+
+
+def _lines(mesh: Mesh, prepared: Prepared, options: RemeshOptions) -> Lines:
+    """Return the lines on a prepared surface that the edges of the result are to follow."""
+    prescribed = [mesh.features, *([] if options.features is None else [options.features])]
+    tagged = _tagged(prescribed, mesh.surface, prepared.surface, options)
+    return Lines(tagged, *_borders(with_split_sides(mesh, prepared.report, options), prepared.surface, options))
+
+
+def _ends(surface: Surface, edges: EdgeMask) -> PointMask:
+    """Return at which points (V,) exactly one of some edges (E,) ends."""
+    return np.asarray(np.bincount(surface.edges[edges].ravel(), minlength=surface.n_points) == 1)
 
 
 def _tagged(
