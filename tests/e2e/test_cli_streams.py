@@ -57,6 +57,10 @@ def test_a_pipe(tmp_path):
         "-n",
         "100",
         "--no-fit",
+        "--metric",
+        "uniform",
+        "--max-iterations",
+        "2",
     ]
     data = (tmp_path / "torus.off").read_bytes()
     done = subprocess.run(command, input=data, capture_output=True, check=True, timeout=300)
