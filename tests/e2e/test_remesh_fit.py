@@ -26,7 +26,9 @@ def remeshed(name, **options):
     return result, anisomesh.evaluate(shape, result.surface, samples=20_000)
 
 
-@pytest.mark.parametrize("name", SHAPES)
+@pytest.mark.parametrize(
+    "name", [name if name == "part" else pytest.param(name, marks=pytest.mark.slow) for name in SHAPES]
+)
 def test_a_fit_lowers_the_error_and_improves_triangles(name):
     (plain, before), (fitted, after), n = remeshed(name, fit=False), remeshed(name), SHAPES[name][1]
     assert after.distance.rms < 0.85 * before.distance.rms
@@ -53,6 +55,7 @@ def test_prescribed_edges_stay_on_their_lines():
     assert covered == pytest.approx(whole, rel=1e-6)
 
 
+@pytest.mark.slow
 def test_the_weight_of_the_shape_trades_distance_for_quality():
     assert anisomesh.RemeshOptions().shape_weight == 1.0
     weights = ({"shape_weight": 0.1}, {}, {"shape_weight": 10.0})
@@ -80,6 +83,7 @@ def test_the_metric_for_the_least_distance_is_nearer(name):
     assert rms[1] < 0.95 * rms[0] + 1e-9
 
 
+@pytest.mark.slow
 def test_parts_are_about_as_near_as_by_quadric_decimation_with_better_triangles():
     part = cad_part(12)
     result = anisomesh.remesh(part, n_vertices=300, metric="approximation")
