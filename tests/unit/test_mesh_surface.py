@@ -6,7 +6,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from anisomesh.errors import MeshError
-from anisomesh.mesh.geometry import cross, thickness, unit_frame
+from anisomesh.mesh.geometry import thickness, unit_frame
 from anisomesh.mesh.surface import Surface
 from anisomesh.shapes import analytic as shapes
 
@@ -106,9 +106,3 @@ def test_stretching_an_equilateral_triangle_by_r_gives_r(r, direction, size, see
 def test_a_triangle_without_area_is_stretched_without_limit():
     surface = Surface(np.array([[0.0, 0, 0], [1, 0, 0], [2, 0, 0]]), np.array([[0, 1, 2], [0, 0, 0]]))
     assert np.isposinf(surface.face_stretch).all()
-
-
-@pytest.mark.parametrize("shape", [(3,), (0, 3), (7, 3), (5, 2, 3)])
-def test_cross_products_are_those_of_numpy_to_the_last_bit(shape):
-    first, second = np.random.default_rng(0).normal(size=(2, *shape))
-    np.testing.assert_array_equal(cross(first, second), np.cross(first, second))

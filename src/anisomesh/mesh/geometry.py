@@ -14,21 +14,10 @@ from anisomesh._arrays import Faces, FaceVectors, Points, PointVectors, Vector3
 _FLAT_THICKNESS = 1e-8  # area over squared longest side; thinner triangles have normals that are rounding; heuristic
 
 
-def cross(first: npt.NDArray[np.float64], second: npt.NDArray[np.float64]) -> npt.NDArray[np.float64]:
-    """Return the cross products (..., 3) of vectors (..., 3), bit for bit as NumPy, which is slow for a few."""
-    a, b, c = first[..., 0], first[..., 1], first[..., 2]
-    d, e, f = second[..., 0], second[..., 1], second[..., 2]
-    product = np.empty(first.shape)
-    np.subtract(b * f, c * e, out=product[..., 0])
-    np.subtract(c * d, a * f, out=product[..., 1])
-    np.subtract(a * e, b * d, out=product[..., 2])
-    return product
-
-
 def face_cross(points: Points, faces: Faces) -> FaceVectors:
     """Return the cross products (F, 3) of two sides of each face: unit normal times twice the area."""
     a, b, c = points[faces[:, 0]], points[faces[:, 1]], points[faces[:, 2]]
-    return cross(b - a, c - a)
+    return np.asarray(np.cross(b - a, c - a))
 
 
 def unit(vectors: npt.NDArray[np.float64]) -> npt.NDArray[np.float64]:
@@ -40,7 +29,7 @@ def unit(vectors: npt.NDArray[np.float64]) -> npt.NDArray[np.float64]:
 def thickness(corners: npt.NDArray[np.float64]) -> npt.NDArray[np.float64]:
     """Return area over squared longest side (n,) of triangles (n, 3, 3): 0 if degenerate, 0.433 if equilateral."""
     sides = corners - corners[:, [1, 2, 0]]
-    area = 0.5 * np.linalg.norm(cross(sides[:, 0], sides[:, 1]), axis=1)
+    area = 0.5 * np.linalg.norm(np.cross(sides[:, 0], sides[:, 1]), axis=1)
     longest = (sides**2).sum(axis=2).max(axis=1)
     return np.asarray(np.divide(area, longest, out=np.zeros_like(area), where=longest > 0.0))
 
@@ -54,15 +43,15 @@ def corner_angles(corners: npt.NDArray[np.float64]) -> npt.NDArray[np.float64]:
     """Return the corner angles (n, 3), in radians, of triangles (n, 3, 3); 0 beside a side of length zero."""
     ahead = unit(corners[:, [1, 2, 0]] - corners)
     back = unit(corners[:, [2, 0, 1]] - corners)
-    sine = np.linalg.norm(cross(ahead, back), axis=2)
+    sine = np.linalg.norm(np.cross(ahead, back), axis=2)
     return np.asarray(np.arctan2(sine, np.einsum("fcx,fcx->fc", ahead, back)))
 
 
 def point_normals(points: Points, faces: Faces) -> PointVectors:
     """Return the area-weighted unit normals (V, 3) of points; zero at a point without faces."""
-    products = face_cross(points, faces)
+    cross = face_cross(points, faces)
     corners = faces.ravel()
-    sums = [np.bincount(corners, np.repeat(products[:, axis], 3), minlength=len(points)) for axis in range(3)]
+    sums = [np.bincount(corners, np.repeat(cross[:, axis], 3), minlength=len(points)) for axis in range(3)]
     return unit(np.stack(sums, axis=1).astype(np.float64))
 
 
