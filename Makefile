@@ -39,6 +39,10 @@ $(BIN)/python:
 
 # The installation is editable, so only a change of the dependencies asks for a new one. Python compiles the few modules
 # that are imported when they are; compiling all of them takes half of the time of the installation.
+$(VENV)/.installed: pyproject.toml constraints.txt | $(BIN)/python
+	$(BIN)/python -m pip install --quiet --no-compile --constraint constraints.txt --editable .
+	touch $@
+
 $(VENV)/.installed-%: pyproject.toml constraints.txt | $(BIN)/python
 	$(BIN)/python -m pip install --quiet --no-compile --constraint constraints.txt --editable ".[$*]"
 	touch $@

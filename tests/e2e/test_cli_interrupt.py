@@ -5,7 +5,7 @@ import signal
 import subprocess
 import sys
 import threading
-import time
+from pathlib import Path
 
 import pytest
 
@@ -60,22 +60,19 @@ def test_interrupt_while_modules_are_imported_is_one_line(tmp_path):
     assert (done.returncode, done.stderr) == (130, "anisomesh: interrupted\n")
 
 
-def test_killed_at_any_moment_the_old_file_or_the_whole_new_one_is_there(torus_obj, tmp_path):
-    """Runs are killed ever later, until one is through; where it writes, the moments are close together."""
-    out = tmp_path / "out.ply"
-    words = [*CLI, "remesh", str(torus_obj), "-o", str(out), "-n", "150", "--embedding", "direct", "--quiet"]
-    start = time.perf_counter()
-    subprocess.run(words, check=True, timeout=240)
-    whole, n_new = time.perf_counter() - start, load(out).n_points
-    old = torus_obj.read_bytes()
-    done = 0
-    for share in (0.3, 0.8, 0.94, 1.0, 1.03):
-        out.write_bytes(old)
-        process = subprocess.Popen(words)
-        time.sleep(share * whole)
-        process.kill()
-        process.wait()
-        if out.read_bytes() != old:
-            assert load(out).n_points == n_new
-            done += 1
-    assert done < 5
+def test_until_the_whole_new_file_takes_its_place_the_old_one_is_there(run_cli, torus_obj, tmp_path, monkeypatch):
+    """So a run that is killed leaves either: a file takes the place of another at once."""
+    out, seen, replace = tmp_path / "out.ply", [], Path.replace
+    out.write_bytes(torus_obj.read_bytes())
+
+    def watched(new, target):
+        seen.append((target, new.read_bytes()))
+        assert out.read_bytes() == torus_obj.read_bytes()
+        return replace(new, target)
+
+    monkeypatch.setattr(Path, "replace", watched)
+    words = ["remesh", torus_obj, "-o", out, "-n", 150, "--quiet", "--embedding", "direct"]
+    assert run_cli(*words).returncode == 0
+    assert seen == [(out, out.read_bytes())]
+    assert load(out).n_points == 150
+    assert list(tmp_path.iterdir()) == [out]

@@ -41,6 +41,7 @@ def test_bad_formats_and_streams():
         load(io.StringIO("OFF"), file_format="off")
 
 
+@pytest.mark.slow
 def test_a_pipe(tmp_path):
     """Nothing but the mesh goes to standard output."""
     save(TORUS, tmp_path / "torus.off")
@@ -57,6 +58,10 @@ def test_a_pipe(tmp_path):
         "-n",
         "100",
         "--no-fit",
+        "--metric",
+        "uniform",
+        "--max-iterations",
+        "2",
     ]
     data = (tmp_path / "torus.off").read_bytes()
     done = subprocess.run(command, input=data, capture_output=True, check=True, timeout=300)

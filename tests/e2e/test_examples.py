@@ -59,7 +59,7 @@ def test_own_metric_keeps_the_open_cylinder(stretch_along_z):
 def test_gallery_draws_the_results(tmp_path, capsys):
     from PIL import Image
 
-    example("gallery").main(str(tmp_path / "three.png"))
+    example("gallery").main(str(tmp_path / "three.png"), n_vertices=200)
     with Image.open(tmp_path / "three.png") as image:
         assert image.width == 2 * 3 * 480
     assert "three.png" in capsys.readouterr().out
@@ -68,7 +68,7 @@ def test_gallery_draws_the_results(tmp_path, capsys):
 @pytest.mark.slow
 def test_noisy_scan_is_better_with_the_network(tmp_path, capsys):
     pytest.importorskip("torch")
-    example("noisy_scan").main(str(tmp_path / "noisy.png"))
+    example("noisy_scan").main(str(tmp_path / "noisy.png"), n_vertices=700)
     assert (tmp_path / "noisy.png").stat().st_size > 10_000
     direct, hybrid = (
         [float(word) for word in line.replace("e-4", "").replace(",", "").split() if word.replace(".", "").isdigit()]

@@ -53,10 +53,17 @@ def in_this_process(monkeypatch):
 
 
 @pytest.mark.slow
-def test_a_build_keeps_drops_and_lists_and_a_second_one_does_nothing(folder, tmp_path):
+def test_a_build_keeps_drops_and_lists_and_a_second_one_does_nothing(folder, tmp_path, monkeypatch):
+    """The first three sources, one of each status, get processes of their own; the others are made in this one."""
     out, calls = tmp_path / "out", []
     recipe = Recipe(target=200, variants=("decimated",), min_stretch=1.2)
-    rows = build(sources_of(folder, 1), out, recipe, remesh, workers=2, on_row=lambda *step: calls.append(step))
+    sources = sources_of(folder, 1)
+    three = [source for source in sources if source.name in {"egg", "ball", "bad"}]
+    first = build(three, out, recipe, remesh, workers=2, on_row=lambda *step: calls.append(step))
+    assert sorted(number for _, number, _ in calls) == [1, 2, 3]
+    monkeypatch.setattr("anisomesh.learn.data.build.isolated", lambda work: work)
+    rows = build(sources, out, recipe, remesh, workers=1, on_row=lambda *step: calls.append(step))
+    assert all(row in rows for row in first)
     status = {row["name"]: row["status"] for row in rows}
     good = {"egg": "kept", "egg2": "kept", "more-ring": "kept", "blobs-0000": "kept"}
     assert status == {**good, "ball": "dropped", "bad": "failed"}
@@ -68,18 +75,18 @@ def test_a_build_keeps_drops_and_lists_and_a_second_one_does_nothing(folder, tmp
         for entry in row.get("items", []):
             item = load_item(out / entry["file"])
             assert len(item.points) == entry["points"]
-    assert sorted(number for _, number, _ in calls) == [1, 2, 3, 4, 5, 6]
+    assert sorted(number for _, number, _ in calls) == [1, 1, 2, 2, 3, 3]
     calls.clear()
-    again = build(sources_of(folder, 1), out, recipe, remesh, workers=2, on_row=lambda *step: calls.append(step))
+    again = build(sources, out, recipe, remesh, workers=1, on_row=lambda *step: calls.append(step))
     assert (again, calls) == (rows, [])
     anisomesh.save(ellipsoid((1.0, 0.6, 0.3), 2), folder / "egg.ply")
     (out / rows[-1]["items"][0]["file"]).unlink()
-    build(sources_of(folder, 1), out, recipe, remesh, workers=2, on_row=lambda *step: calls.append(step))
+    build(sources_of(folder, 1), out, recipe, remesh, workers=1, on_row=lambda *step: calls.append(step))
     assert {row["name"] for row, _, _ in calls} == {"egg", rows[-1]["name"]}  # what has changed, or is gone
 
 
 @pytest.mark.slow
-def test_a_build_that_was_killed_goes_on(folder, tmp_path):
+def test_a_build_that_was_killed_goes_on(in_this_process, folder, tmp_path):
     out = tmp_path / "out"
     code = (
         "from pathlib import Path; from anisomesh.learn.data.build import build\n"
@@ -104,7 +111,7 @@ def test_a_build_that_was_killed_goes_on(folder, tmp_path):
     with (out / MANIFEST).open("a") as file:
         file.write('{"name": "half a ro')
     made = []
-    rows = build(sources_of(folder, 0), out, RECIPE, remesh, workers=2, on_row=lambda row, *_: made.append(row["name"]))
+    rows = build(sources_of(folder, 0), out, RECIPE, remesh, workers=1, on_row=lambda row, *_: made.append(row["name"]))
     assert len(rows) == 5
     assert set(made) == {row["name"] for row in rows} - {row["name"] for row in before}
     assert len(read_manifest(out)) == 5

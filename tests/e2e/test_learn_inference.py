@@ -1,5 +1,6 @@
 """Remeshing with the pretrained networks."""
 
+import os
 import subprocess
 import sys
 from functools import cache
@@ -58,10 +59,11 @@ def test_a_prediction_does_not_import_torch():
     code = (
         "import sys; from anisomesh.learn.inference.predict import predict\n"
         "from anisomesh.shapes.analytic import sphere\n"
-        "ball = sphere(2); predict(ball.with_points(ball.points / ball.diagonal))\n"
+        "ball = sphere(1); predict(ball.with_points(ball.points / ball.diagonal))\n"
         "assert 'torch' not in sys.modules"
     )
-    subprocess.run([sys.executable, "-c", code], check=True)
+    uncompiled = {**os.environ, "NUMBA_DISABLE_JIT": "1"}  # which is faster for a few points
+    subprocess.run([sys.executable, "-c", code], check=True, env=uncompiled)
 
 
 @pytest.mark.slow
@@ -79,15 +81,19 @@ def test_a_smooth_shape_is_remeshed_as_well_as_directly(remeshed_egg, embedding)
 
 @pytest.mark.slow
 @pytest.mark.parametrize("size", [0.1, 0.3, 0.5])
+def test_the_size_of_noise_is_estimated(size):
+    noisy = with_noise(unit_torus(), size, np.random.default_rng(0))
+    assert predict(noisy).noise == pytest.approx(size, rel=0.4)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("size", [0.1, 0.3])
 def test_noise_is_removed(size):
-    clean = unit_torus()
+    clean, measured = unit_torus(), {}
     noisy = with_noise(clean, size, np.random.default_rng(0))
-    found = predict(noisy)
-    assert found.noise == pytest.approx(size, rel=0.4)
-    measured = {}
     for name in ("direct", "filtered", "hybrid"):
-        result = anisomesh.remesh(noisy, n_vertices=400, embedding=name)
-        measured[name] = evaluate(clean, result.surface, samples=20_000)
+        result = anisomesh.remesh(noisy, n_vertices=400, embedding=name, max_iterations=20)
+        measured[name] = evaluate(clean, result.surface, samples=5_000)
         assert (result.noise > 0.0) == (name != "direct")
     for name in ("filtered", "hybrid"):
         assert measured[name].shape.g_mean > measured["direct"].shape.g_mean + 0.02
@@ -108,8 +114,8 @@ def test_noise_is_kept_on_request(egg):
 
 @pytest.mark.slow
 def test_an_error_from_the_noisy_input_leaves_the_noise(egg):
-    noisy = with_noise(egg, 0.3, np.random.default_rng(0))
-    error = 0.03
+    noisy = with_noise(egg, 2.0 * NOISE_FLOOR, np.random.default_rng(0))
+    error = 0.02
     result = anisomesh.remesh(noisy, max_error=error, embedding="neural", max_iterations=10)
     assert result.noise == 0.0
     assert result.distance <= error

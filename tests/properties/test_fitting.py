@@ -25,6 +25,7 @@ from anisomesh.metric.quality import anisotropic_quality
 from anisomesh.metric.transfer import PlacedMetric
 from anisomesh.shapes import analytic as shapes
 from anisomesh.shapes.cad_part import cad_part
+from conftest import examples
 
 NO_EDGES = np.zeros((0, 2), dtype=np.int64)
 
@@ -221,6 +222,7 @@ def test_what_is_held_or_kept_stays():
     assert (fitted.on_boundary == mesh.on_boundary).all()
 
 
+@examples(40)
 @given(seed=st.integers(0, 1_000), size=st.floats(0.0, 0.35))
 def test_a_fit_keeps_the_topology_and_adds_no_fault(seed, size):
     surface = cad_part(5)

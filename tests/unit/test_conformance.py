@@ -9,6 +9,7 @@ from polygon_functions import plain, without_site_gradient
 
 import anisomesh
 from anisomesh import ConformanceError, MetricError, MetricField, NormalMetric, OptionError
+from anisomesh.shapes.analytic import torus
 
 
 class Wrong:
@@ -223,4 +224,4 @@ MASS_FAULT = ("mass", lambda mass: 1e-300 * mass, "a site is not finite or far b
 @pytest.mark.parametrize(("name", "change", "message"), [*ENERGY_FAULTS, MASS_FAULT])
 def test_a_remesh_ends_at_the_first_wrong_value_of_an_energy(name, change, message):
     with pytest.raises(OptionError, match=message):
-        anisomesh.remesh(anisomesh.sample("ring"), n_vertices=60, embedding="direct", energy=Wrong(**{name: change}))
+        anisomesh.remesh(torus(1.0, 0.3, 24, 12), n_vertices=60, embedding="direct", energy=Wrong(**{name: change}))
