@@ -11,8 +11,9 @@ from anisomesh._arrays import EdgeMask, PointLabels, Points
 from anisomesh.conforming.chains import conform
 from anisomesh.delaunay.feature_mesh import edges_left, renumbered
 from anisomesh.delaunay.meshing import MeshingTask, ValidMesh
-from anisomesh.junctions.chains import bundled
+from anisomesh.junctions.chains import Bundled, bundled
 from anisomesh.junctions.cut import Junctions
+from anisomesh.junctions.narrow import beside, without_narrow_faces
 from anisomesh.mesh.geometry import Frame, even_edge_length
 from anisomesh.mesh.surface import Surface
 from anisomesh.mesh.topology import edge_keys
@@ -24,9 +25,12 @@ from anisomesh.meshops.inverted import remove_inverted_triangles
 from anisomesh.meshops.split import edge_split, split_longest_edges
 from anisomesh.metric.transfer import transfer_metric_roots
 
+_MAX_CROWDING = 2.0  # vertices of a chain in the length of a mean edge; heuristic
+_MAX_EXCESS = 1.5  # of the vertices asked for, where junctions take more; heuristic
 _MAX_SETTLING_ROUNDS = 10  # of changes until no edges coincide and the number of vertices is right
 
 Ints = npt.NDArray[np.int64]
+Floats = npt.NDArray[np.float64]
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -156,8 +160,13 @@ class JoinTask:
         reference = sheets.with_points(self.frame.to_unit(sheets.points))
         exact = np.array_equal(reference.points, task.surface.points)
         found = bundled(Surface(mesh.points, mesh.faces), self.junctions, reference, exact=exact)
+        thinner = None if found is None else _thinned(mesh, found, task)
+        if thinner is not None:
+            mesh = thinner
+            found = bundled(Surface(mesh.points, mesh.faces), self.junctions, reference, exact=exact)
         if found is None:
             return None
+        found = without_narrow_faces(found, task.reference)
         made = conform(found.points, found.faces, found.bundles)
         seam = _seam(made.points, made.chains)
         tidy = _tidied(replace(mesh, points=made.points, faces=made.faces), task)
@@ -170,6 +179,36 @@ class JoinTask:
         """Return the joined sheets of a mesh, None if that would join more than its seam."""
         settled = _settled(conforming, self.task, self.n_vertices)
         return None if settled is None else conforming.seam.join(Surface(settled.points, settled.faces))
+
+
+def _thinned(mesh: ValidMesh, found: Bundled, task: MeshingTask) -> ValidMesh | None:
+    """Return a mesh with edges collapsed where chains have many more vertices than their metric length asks for.
+
+    None if no chain has. The vertices there, as added to short boundaries for the topology, would come into all sheets.
+    """
+    sheets = Surface(mesh.points, mesh.faces)
+    roots = transfer_metric_roots(task.embedded_reference, task.roots, found.points)
+
+    def lengths(ends: Ints) -> Floats:
+        way = found.points[ends[:, 1]] - found.points[ends[:, 0]]
+        return np.asarray(np.linalg.norm(np.einsum("eij,ej->ei", roots[ends].mean(axis=1), way), axis=1))
+
+    even = float(lengths(sheets.edges.astype(np.int64)).mean())
+    stays, surplus = np.ones(sheets.n_points, dtype=bool), 0
+    for bundle in found.bundles:
+        for chain in bundle.chains:
+            length = float(lengths(np.stack([chain.points[:-1], chain.points[1:]], axis=1)).sum())
+            most = max(bundle.least, int(_MAX_CROWDING * length / even))
+            inner = chain.points[1:-1][chain.points[1:-1] < sheets.n_points]
+            if len(inner) > most:
+                stays[inner], surplus = False, surplus + len(inner) - most
+    if not surplus:
+        return None
+    wanted = sheets.n_points - surplus
+    fewer = decimate(
+        sheets, wanted, held=stays, crease_edges=mesh.crease_edges, moves=False, reference=task.reference
+    )
+    return replace(mesh, points=fewer.surface.points, faces=fewer.surface.faces, crease_edges=fewer.crease_edges)
 
 
 def _tidied(mesh: ValidMesh, task: MeshingTask) -> ValidMesh:
@@ -200,7 +239,8 @@ def _settled(conforming: Conforming, task: MeshingTask, n: int) -> ValidMesh | N
     """Return a mesh of sheets changed away from the seam, such that it has n vertices and no new edge when joined.
 
     Edges of two sheets between the same two vertices of the seam become one when these are joined; one of them is
-    split. Then points are removed or added. None if that does not end.
+    split. Then points are removed or added; if no more can be removed, it may have somewhat more. None if that does not
+    end.
     """
     mesh, seam = conforming.mesh, conforming.seam
     apart = mesh.points[:0]  # points that keep edges from becoming one
@@ -219,7 +259,7 @@ def _settled(conforming: Conforming, task: MeshingTask, n: int) -> ValidMesh | N
         else:
             points, faces, creases = _with_count(mesh, task, seam, apart, sheets.n_points + n - n_joined)
             if len(points) == sheets.n_points:
-                return None
+                return mesh if n < n_joined <= _MAX_EXCESS * n else None
         mesh = replace(mesh, points=points, faces=faces, crease_edges=creases)
     return None
 
