@@ -26,7 +26,7 @@ from anisomesh.delaunay.meshing import ValidMesh
 from anisomesh.errors import OptionError
 from anisomesh.execution.deadline import Deadline
 from anisomesh.execution.progress import OnStep, StepInfo, ignore_steps
-from anisomesh.execution.run import Run
+from anisomesh.execution.run import OPTIMISATION_SHARE, Run
 from anisomesh.io.meshes import mesh_of
 from anisomesh.junctions.join import JoinTask, sites_for
 from anisomesh.mesh.surface import Surface
@@ -155,14 +155,17 @@ def _with_attributes(result: RemeshResult, given: Mesh, cut: Cut, options: Remes
 
 
 def _joined_or_apart(given: Mesh, cut: Cut, n: int, options: RemeshOptions, run: Run, **how: Any) -> RemeshResult:
-    """Remesh a prepared surface with n vertices, its sheets joined at junctions; apart if that does not succeed."""
-    result = _remesh(cut, n, options, run, **how)
-    if result is None:
-        logger.info("the sheets cannot be joined with %d vertices, and are remeshed apart", n)
-        result = _remesh(_cut(given, options, run, joined=False), n, options, run, **how)
-    if result is None:
+    """Remesh a prepared surface with n vertices, its sheets joined at junctions; apart if that has fewer faults."""
+    joined = _remesh(cut, n, options, run, **how)
+    if joined is not None:
+        late = run.deadline.share(OPTIMISATION_SHARE).passed()
+        if cut.rest.junctions is None or not joined.validity.faults or late:
+            return joined
+    logger.info("the sheets cannot be joined well with %d vertices, and are remeshed apart", n)
+    apart = _remesh(_cut(given, options, run, joined=False), n, options, run, **how)
+    if apart is None:
         raise AssertionError("a mesh without junctions was not joined")
-    return result
+    return apart if joined is None or apart.validity.faults < joined.validity.faults else joined
 
 
 def _remesh(
@@ -217,7 +220,7 @@ def _remesh(
         validity=validity,
         seconds=run.total_seconds(),
         warnings=(
-            *losses_of_repair(prepared.report, joined=junctions is not None),
+            *losses_of_repair(prepared.report, joined=made.joined),
             *cut.remarks,
             *measured.remarks,
             *field.remarks,

@@ -25,6 +25,7 @@ from anisomesh.voronoi.restricted import RestrictedVoronoi
 
 logger = logging.getLogger(__name__)
 
+_MAX_FAULTS_OF_JOINED = 10  # up to which another start is tried for joined sheets, that may be better apart; heuristic
 MAX_STARTS = 3  # of the optimisation, with one seed after the other, for a mesh without faults
 
 
@@ -39,18 +40,14 @@ class MeshTask:
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class MadeMesh:
-    """A mesh, its distance from prescribed edges, the sites it was made from, and the seed of their start."""
+    """A mesh, whether its sheets are joined, its distance from prescribed edges, its sites and their seed."""
 
     mesh: ValidMesh
     optimised: Optimised
     validity: Validity
     feature_distance: float
     seed: int
-
-    @property
-    def faults(self) -> int:
-        """Faults that another start may avoid."""
-        return self.validity.inverted + self.validity.new_intersections + self.validity.flat
+    joined: bool
 
 
 def valid_mesh(task: MeshTask, options: RemeshOptions, run: Run) -> MadeMesh | None:
@@ -60,13 +57,15 @@ def valid_mesh(task: MeshTask, options: RemeshOptions, run: Run) -> MadeMesh | N
     """
     best = made = _mesh_of_start(task, options, run)
     for seed in range(options.seed + 1, options.seed + MAX_STARTS):
-        if best is None or made is None or not best.faults or run.deadline.passed():
+        if best is None or made is None or not best.validity.faults or run.deadline.passed():
+            break
+        if task.join is not None and best.validity.faults > _MAX_FAULTS_OF_JOINED:
             break
         if made.validity.self_intersections_input > 0 or made.mesh.from_input:
             break
         fresh = replace(task.dual, voronoi=RestrictedVoronoi(task.dual.voronoi.embedded, threads=options.threads))
         made = _mesh_of_start(replace(task, dual=fresh), replace(options, seed=seed), run)
-        if made is not None and made.faults < best.faults:
+        if made is not None and made.validity.faults < best.validity.faults:
             best = made
     return best
 
@@ -90,7 +89,9 @@ def _mesh_of_start(start: MeshTask, options: RemeshOptions, run: Run) -> MadeMes
         if conforming is not None:
             mesh = conforming.mesh
         elif join is not None:
-            return None
+            if not run.deadline.share(OPTIMISATION_SHARE).passed():
+                return None  # there is time to remesh what is better apart
+            mesh = join.apart(mesh)
     with run.stage("fit"):
         surface = Surface(mesh.points, mesh.faces)
         feature_distance = distance_to_crease_edges(
@@ -100,13 +101,16 @@ def _mesh_of_start(start: MeshTask, options: RemeshOptions, run: Run) -> MadeMes
             surface = fit_without_faults(surface, target, crease_edges=mesh.crease_edges, deadline=run.deadline)
             mesh = replace(mesh, points=surface.points, faces=surface.faces, crease_edges=mesh.crease_edges[:0])
         if conforming is not None and join is not None:
-            joined = join.joined(conforming.after(surface))
-            if joined is None:
-                return None
-            mesh, surface = replace(mesh, points=joined.points, faces=joined.faces), joined
+            surface = join.joined(conforming, surface)
+            mesh = replace(mesh, points=surface.points, faces=surface.faces)
         validity = check_validity(surface, task.surface, None if join is None else join.junctions.whole)
     facts = options.seed, optimised.iterations, optimised.status, soundness(validity)
     logger.info("seed %d: %d iterations, %s; mesh: %s", *facts)
     return MadeMesh(
-        mesh=mesh, optimised=optimised, validity=validity, feature_distance=feature_distance, seed=options.seed
+        mesh=mesh,
+        optimised=optimised,
+        validity=validity,
+        feature_distance=feature_distance,
+        seed=options.seed,
+        joined=conforming is not None,
     )

@@ -86,6 +86,28 @@ def test_sheets_that_cannot_be_joined_are_apart_and_it_is_said(monkeypatch):
     assert result.validity.nonmanifold_edges == 0
 
 
+def test_sheets_that_cannot_be_joined_in_time_are_left_apart_and_it_is_said(monkeypatch):
+    def too_late(self, mesh):
+        self.task.deadline.start -= 2.0 * self.task.deadline.limit
+
+    monkeypatch.setattr(join.JoinTask, "conforming", too_late)
+    surface = Surface(*SHAPES["tee"]())
+    result = anisomesh.remesh(surface, n_vertices=120, embedding="direct", threads=1, time_limit=1e4)
+    assert [warning for warning in result.warnings if "separate in the result" in warning]
+    assert result.surface.n_points == 120
+
+
+@pytest.mark.parametrize("target", [{"max_error": 0.02}, {"edge_length": 0.3}])
+def test_sheets_are_joined_for_every_target(target):
+    surface = Surface(*SHAPES["tee"]())
+    result = anisomesh.remesh(surface, embedding="direct", threads=1, **target)
+    before, after = (lengths_by_count(each.points, each.faces) for each in (surface, result.surface))
+    assert before.keys() == after.keys()
+    assert after[3] == pytest.approx(before[3])
+    if "max_error" in target:
+        assert surface_distance(surface, result.surface, samples=5_000).hausdorff <= 0.02
+
+
 @pytest.mark.parametrize("name", ["two_boxes", "soap_films"])
 def test_points_to_keep_on_a_junction_are_vertices_of_all_its_sheets(name):
     surface = Surface(*SHAPES[name]())

@@ -76,3 +76,42 @@ def test_loops_at_the_same_place_are_told_apart():
         assert (found.points >= 49).all() == upper  # the sheets of the mesh are in the other order
         assert (np.diff(found.places) > 0.0).all()
         assert len(found.points) == 24
+
+
+def test_many_loops_in_pairs_are_told_apart():
+    """Pairs of plates, each with its boundary in common, on a grid: each loop belongs to the plate it is nearest to."""
+
+    def plates(n, order):
+        parts = [
+            square(n, n, lambda u, v, k=k: (u + 2 * (k // 2), v, (1 - 2 * (k % 2)) * u * v * (1 - u) * (1 - v) * 4))
+            for k in order
+        ]
+        faces = np.concatenate([faces + n * n * k for k, (_, faces) in enumerate(parts)])
+        return Surface(np.concatenate([points for points, _ in parts]), faces)
+
+    order = np.random.default_rng(0).permutation(60)
+    reference, mesh = plates(7, range(60)), plates(4, order)
+    loops = [loop.astype(np.int64) for loop in boundary_loops(reference.faces)]
+    placed = boundary_places(mesh, reference, loops)
+    assert placed is not None
+    for loop, found in zip(loops, placed, strict=True):
+        assert order[found.points[0] // 16] == loop[0] // 49
+
+
+def test_a_small_loop_of_a_face_that_is_turned_is_placed_in_order():
+    reference = Surface(*square(9, 9, lambda u, v: (u, v, 0 * u)))
+    (loop,) = (each.astype(np.int64) for each in boundary_loops(reference.faces))
+    turned = Surface(np.array([[0.0, 0.0, 0.0], [0.5, 1.0, 0.0], [1.0, 0.0, 0.0]]), np.array([[0, 1, 2]]))
+    (found,) = boundary_places(turned, reference, [loop])
+    assert sorted(found.points.tolist()) == [0, 1, 2]
+    assert (np.diff(found.places) > 0.0).all()
+    assert 0.0 <= found.places[0] < found.places[-1] < 4.0
+
+
+def test_vertices_at_one_place_are_spaced_evenly():
+    points, faces, chains = strips([6, 2], np.random.default_rng(0))
+    points[1:5] = on_curve([0.7])
+    chains[0] = Chain(chains[0].points, np.array([0.0, 0.7, 0.7, 0.7, 0.7, START[-1]]))
+    made = conform(points, faces, [Bundle(CURVE, chains)])
+    height = made.points[made.chains[0][0], 1]
+    assert np.diff(height).min() > 0.1 * np.diff(height).mean()

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import cached_property
 from itertools import pairwise
 
 import numpy as np
@@ -18,8 +19,10 @@ from anisomesh.mesh.topology import boundary_loops, half_edges
 _SPACING = 0.25  # mean edge lengths between samples of the reference; heuristic
 _MAX_SAMPLES = 64  # of one side
 _MAX_TABLE = 4_000_000  # pairs of sides and samples, up to which the best order is looked for
-_MAX_LOOPS = 300  # up to which each is compared with each
+_MAX_LOOPS = 1_000  # up to which each is compared with all near ones
+_FAR = 16.0  # squared distance of loops, in edges, that counts as it is: directions differ by 8 at most
 _STARTS = 32  # samples tried for the first side then
+_TURNS = 64  # starts tried of a loop that is placed by its length
 
 Ints = npt.NDArray[np.int64]
 Floats = npt.NDArray[np.float64]
@@ -59,107 +62,149 @@ def boundary_places(mesh: Surface, reference: Surface, loops: list[Ints]) -> lis
     from it into its face: the nearest side of the reference is found among samples in nine dimensions. A loop belongs
     to the one that most of its sides are at, or, if two would belong to the same one, to the one that makes the sum of
     all distances least. Its points lie between the places of the sides at them. Where these are not in order, the
-    order along the reference is found that is nearest in all, by dynamic programming.
+    order along the reference is found that is nearest in all, by dynamic programming; where that does not go around
+    either, as for small loops with faulty faces, they are placed by the length of the loop.
     """
     found = [loop.astype(np.int64) for loop in boundary_loops(mesh.faces)]
     if len(found) != len(loops):
         return None
-    lengths = np.concatenate([_side_lengths(mesh, loop) for loop in found])
-    samples = _Samples.of(reference, loops, float(lengths.mean()))
-    numbers = samples.loops_of(mesh, found)
+    if not found:
+        return []
+    sides, wanted = _Sides.of(mesh, found), _Sides.of(reference, loops)
+    samples = _Samples.of(wanted, float(sides.lengths.mean()))
+    numbers = samples.loops_of(sides)
     if numbers is None:
         return None
     placed = {}
-    for loop, number in zip(found, numbers.tolist(), strict=True):
-        corners = reference.points[np.append(loops[number], loops[number][0])]
-        order = _placed(mesh.points[loop], samples.of_loop(number).nearest(*_frames(mesh, loop))[1], corners)
-        if order is None:
-            scale = _side_lengths(reference, loops[number]).sum() / len(loop)
-            own = _Samples.of(reference, [loops[number]], float(scale))
-            if len(loop) * len(own.place) <= _MAX_TABLE:
-                order = _placed(mesh.points[loop], own.in_order(*_frames(mesh, loop)), corners, forward=True)
-        if order is None:
+    for k, number in enumerate(numbers.tolist()):
+        own, target = sides.of_loop(k), wanted.of_loop(number)
+        result = _placed(own.start, samples.of_loop(number).nearest(own)[1], target.corners)
+        if result is None:
+            finer = _Samples.of(target, float(target.lengths.sum()) / len(own.start))
+            if len(own.start) * len(finer.place) <= _MAX_TABLE:
+                result = _placed(own.start, finer.in_order(own), target.corners, forward=True)
+        result = result or _placed_by_length(own, target.corners, samples.scale)
+        if result is None:
             return None
-        placed[number] = LoopPlaces(np.roll(loop, -order[0]), order[1])
+        placed[number] = LoopPlaces(np.roll(found[k], -result[0]), result[1])
     return [placed[number] for number in range(len(loops))]
 
 
-def _side_lengths(surface: Surface, loop: Ints) -> Floats:
-    corners = surface.points[loop]
-    return np.asarray(np.linalg.norm(np.roll(corners, -1, axis=0) - corners, axis=1))
+@dataclass(frozen=True, eq=False)
+class _Sides:
+    """The sides of boundary loops, one loop after the other.
 
+    Start and end of each (n, 3), the direction from it into its face and the normal of that (n, 6), and the bounds of
+    the loops (m + 1,).
+    """
 
-def _frames(surface: Surface, loop: Ints) -> tuple[Floats, Floats]:
-    """Return the middles (n, 3) of the sides of a loop, and their inward directions and normals (n, 6)."""
-    sides = half_edges(surface.faces).astype(np.int64)
-    keys = sides[:, 0] << 32 | sides[:, 1]
-    order = np.argsort(keys)
-    after = np.roll(loop, -1)
-    face = order[np.searchsorted(keys[order], loop << 32 | after)] // 3
-    normal = surface.face_normals[face]
-    inward = np.cross(normal, unit(surface.points[after] - surface.points[loop]))
-    return 0.5 * (surface.points[loop] + surface.points[after]), np.concatenate([inward, normal], axis=1)
+    start: Floats
+    end: Floats
+    directions: Floats
+    bounds: Ints
+
+    @classmethod
+    def of(cls, surface: Surface, loops: list[Ints]) -> _Sides:
+        """Return the sides of loops of a surface."""
+        sides = half_edges(surface.faces).astype(np.int64)
+        keys = sides[:, 0] << 32 | sides[:, 1]
+        order = np.argsort(keys)
+        first, after = np.concatenate(loops), np.concatenate([np.roll(loop, -1) for loop in loops])
+        face = order[np.searchsorted(keys[order], first << 32 | after)] // 3
+        start, end, normal = surface.points[first], surface.points[after], surface.face_normals[face]
+        directions = np.concatenate([np.cross(normal, unit(end - start)), normal], axis=1)
+        return cls(start, end, directions, np.cumsum([0, *(len(loop) for loop in loops)]))
+
+    @cached_property
+    def lengths(self) -> Floats:
+        return np.asarray(np.linalg.norm(self.end - self.start, axis=1))
+
+    @property
+    def corners(self) -> Floats:
+        """The points (n + 1, 3) of a single loop, the first one again at the end."""
+        return np.concatenate([self.start, self.start[:1]])
+
+    def of_loop(self, k: int) -> _Sides:
+        """Return the sides of one loop."""
+        part = slice(self.bounds[k], self.bounds[k + 1])
+        return _Sides(
+            self.start[part], self.end[part], self.directions[part], np.array([0, self.bounds[k + 1] - self.bounds[k]])
+        )
+
+    def boxes(self) -> Floats:
+        """Return the lowest and highest coordinates (2, m, 3) of each loop."""
+        first = self.bounds[:-1]
+        return np.stack([np.minimum.reduceat(self.start, first), np.maximum.reduceat(self.start, first)])
 
 
 @dataclass(frozen=True, eq=False)
 class _Samples:
-    """Samples of boundary loops: nine coordinates, the loop of each, and its arc length on that."""
+    """Samples of the sides of loops: nine coordinates, the loop of each, ascending, and its arc length on that."""
 
     coordinates: Floats
     loop: Ints
     place: Floats
     scale: float
+    boxes: Floats
 
     @classmethod
-    def of(cls, reference: Surface, loops: list[Ints], scale: float) -> _Samples:
+    def of(cls, sides: _Sides, scale: float) -> _Samples:
         """Return samples about a quarter of ``scale`` apart."""
-        coordinates, numbers, places = [], [], []
-        for number, loop in enumerate(loops):
-            length, directions = _side_lengths(reference, loop), _frames(reference, loop)[1]
-            count = np.clip(np.ceil(length / (_SPACING * scale)), 1, _MAX_SAMPLES).astype(np.int64)
-            side = np.repeat(np.arange(len(loop)), count)
-            share = (np.arange(len(side)) - np.repeat(np.cumsum(count) - count, count) + 0.5) / count[side]
-            start, end = reference.points[loop][side], reference.points[np.roll(loop, -1)][side]
-            at = start + share[:, None] * (end - start)
-            coordinates.append(np.concatenate([at / scale, directions[side]], axis=1))
-            numbers.append(np.full(len(side), number))
-            places.append((np.cumsum(length) - length)[side] + share * length[side])
-        return cls(np.concatenate(coordinates), np.concatenate(numbers), np.concatenate(places), scale)
+        length = sides.lengths
+        count = np.clip(np.ceil(length / (_SPACING * scale)), 1, _MAX_SAMPLES).astype(np.int64)
+        side = np.repeat(np.arange(len(length)), count)
+        share = (np.arange(len(side)) - np.repeat(np.cumsum(count) - count, count) + 0.5) / count[side]
+        at = sides.start[side] + share[:, None] * (sides.end - sides.start)[side]
+        loop = np.repeat(np.arange(len(sides.bounds) - 1), np.diff(sides.bounds))
+        before = np.concatenate([[0.0], np.cumsum(length)])
+        place = (before[:-1] - before[sides.bounds[loop]])[side] + share * length[side]
+        coordinates = np.concatenate([at / scale, sides.directions[side]], axis=1)
+        return cls(coordinates, loop[side], place, scale, sides.boxes())
 
-    def loops_of(self, mesh: Surface, found: list[Ints]) -> Ints | None:
-        """Return the loop (n,) that each of as many loops of a mesh follows, None if they cannot be told apart."""
-        numbers = np.array([np.bincount(self.nearest(*_frames(mesh, loop))[0]).argmax() for loop in found])
-        if len(np.unique(numbers)) == len(found):
+    @cached_property
+    def tree(self) -> cKDTree:
+        return cKDTree(self.coordinates)
+
+    def loops_of(self, sides: _Sides) -> Ints | None:
+        """Return the loop (m,) that each of as many loops of a mesh follows, None if they cannot be told apart."""
+        nearest = np.split(self.nearest(sides)[0], sides.bounds[1:-1])
+        numbers = np.array([np.bincount(each).argmax() for each in nearest])
+        if len(np.unique(numbers)) == len(numbers):
             return numbers
-        if len(found) > _MAX_LOOPS:
+        if len(numbers) > _MAX_LOOPS:
             return None
-        costs = np.empty((len(found), len(found)))
-        for k in range(len(found)):
-            tree = cKDTree(self.of_loop(k).coordinates)
-            for j, loop in enumerate(found):
-                costs[j, k] = (tree.query(self._queries(*_frames(mesh, loop)))[0] ** 2).mean()
+        (low, high), (own_low, own_high) = self.boxes, sides.boxes()
+        gaps = np.maximum(np.maximum(low[None] - own_high[:, None], own_low[:, None] - high[None]), 0.0)
+        costs = ((gaps / self.scale) ** 2).sum(axis=2)
+        loops = [sides.of_loop(j) for j in range(len(numbers))]
+        for k in np.flatnonzero((costs < _FAR).any(axis=0)).tolist():
+            tree = self.of_loop(k).tree
+            for j in np.flatnonzero(costs[:, k] < _FAR).tolist():
+                costs[j, k] = (tree.query(self._queries(loops[j]))[0] ** 2).mean()
         return np.asarray(linear_sum_assignment(costs)[1])
 
     def of_loop(self, number: int) -> _Samples:
         """Return the samples of one loop."""
-        mine = self.loop == number
-        return _Samples(self.coordinates[mine], self.loop[mine], self.place[mine], self.scale)
+        part = slice(*np.searchsorted(self.loop, [number, number + 1]))
+        box = self.boxes[:, number : number + 1]
+        return _Samples(self.coordinates[part], self.loop[part], self.place[part], self.scale, box)
 
-    def nearest(self, points: Floats, directions: Floats) -> tuple[Ints, Floats]:
-        """Return the loop (n,) and the arc length on it (n,) nearest to points (n, 3) with directions (n, 6)."""
-        nearest = cKDTree(self.coordinates).query(self._queries(points, directions))[1]
+    def nearest(self, sides: _Sides) -> tuple[Ints, Floats]:
+        """Return the loop (n,) and the arc length on it (n,) nearest to sides (n,)."""
+        nearest = self.tree.query(self._queries(sides))[1]
         return self.loop[nearest], self.place[nearest]
 
-    def _queries(self, points: Floats, directions: Floats) -> Floats:
-        return np.concatenate([points / self.scale, directions], axis=1)
+    def _queries(self, sides: _Sides) -> Floats:
+        return np.concatenate([0.5 * (sides.start + sides.end) / self.scale, sides.directions], axis=1)
 
-    def in_order(self, points: Floats, directions: Floats) -> Floats:
-        """Return the arc lengths (n,) on one loop of places (n, 3) around it, in their order and near in all."""
-        table = cdist(self._queries(points, directions), self.coordinates, "sqeuclidean")
+    def in_order(self, sides: _Sides) -> Floats:
+        """Return the arc lengths (n,) on one loop of sides (n,) around it, in their order and near in all."""
+        table = cdist(self._queries(sides), self.coordinates, "sqeuclidean")
         clearest = int(np.argmin(table.min(axis=1)))
         table = np.roll(table, -clearest, axis=0)
         best, chosen = np.inf, [0] * len(table)
-        for start in np.argsort(table[0], kind="stable")[:_STARTS].tolist():
+        starts = min(_STARTS, max(_MAX_TABLE // table.size, 1))
+        for start in np.argsort(table[0], kind="stable")[:starts].tolist():
             costs = np.roll(table, -start, axis=1)
             total, way = costs[0, :1].repeat(costs.shape[1]), []
             for row in costs[1:]:
@@ -196,10 +241,30 @@ def _placed(points: Floats, sides: Floats, corners: Floats, *, forward: bool = F
     placed = np.empty(len(points))
     for k, (point, low, step) in enumerate(zip(points, before.tolist(), steps.tolist(), strict=True)):
         placed[k] = _closest(point, low + min(step, 0.0), abs(step), start, corners)
-    placed = np.minimum(np.maximum.accumulate(placed), placed[0] + total)
+    return _from_start(np.minimum(np.maximum.accumulate(placed), placed[0] + total), total)
+
+
+def _from_start(placed: Floats, total: float) -> tuple[int, Floats]:
+    """Return which of some ascending arc lengths (n,) around a loop is the first behind its start, and all from it."""
     turn = np.floor(placed / total)
     first = int(np.argmax(turn > turn[0])) if turn[-1] > turn[0] else 0
     return first, np.roll(placed - turn * total, -first)
+
+
+def _placed_by_length(loop: _Sides, corners: Floats, reach: float) -> tuple[int, Floats] | None:
+    """Return the arc lengths (n,) of the points of a loop on a closed polyline (m + 1, 3), by the loop's own length.
+
+    The loop begins where its points come nearest in all. Returned as by :func:`_placed`; None if they are farther off
+    than ``reach`` and their mean distance along the polyline.
+    """
+    start = np.concatenate([[0.0], np.cumsum(np.linalg.norm(np.diff(corners, axis=0), axis=1))])
+    total, n = float(start[-1]), len(loop.start)
+    share = (np.cumsum(loop.lengths) - loop.lengths) / max(float(loop.lengths.sum()), np.finfo(np.float64).tiny)
+    places = total * (np.linspace(0.0, 1.0, _TURNS, endpoint=False)[:, None] + share)
+    at = np.stack([np.interp(places, start, axis, period=total) for axis in corners.T], axis=-1)
+    squares = ((at - loop.start) ** 2).sum(axis=2).mean(axis=1)
+    best = int(np.argmin(squares))
+    return _from_start(places[best], total) if squares[best] <= max(total / n, reach) ** 2 else None
 
 
 def _closest(point: Floats, first: float, length: float, start: Floats, corners: Floats) -> float:

@@ -12,6 +12,7 @@ import numpy.typing as npt
 from anisomesh._arrays import Faces, Points
 
 _SAME_VERTEX_REACH = 0.7  # distances to the next vertices, up to which two vertices become one; heuristic
+_LEAST_GAP = 0.01  # of the mean distance of vertices on a curve, below which they are spaced evenly; heuristic
 
 Ints = npt.NDArray[np.int64]
 Floats = npt.NDArray[np.float64]
@@ -168,8 +169,23 @@ def _common_vertices(points: Points, bundle: Bundle) -> list[_Vertex]:
         ends = np.array([0.0, *(vertex.place for vertex in vertices), float(start[-1])])
         widest = int(np.argmax(np.diff(ends)))
         middle = 0.5 * float(ends[widest] + ends[widest + 1])
-        at = np.array([np.interp(middle, start, bundle.curve[:, axis]) for axis in range(3)])
-        vertices.insert(widest, _Vertex(middle, at))
+        vertices.insert(widest, _Vertex(middle, _at(middle, start, bundle.curve)))
+    return _told_apart(vertices, start, bundle.curve)
+
+
+def _at(place: float, start: Floats, curve: Floats) -> Floats:
+    """Return the point (3,) at an arc length of a curve (m, 3), of which the arc length at each point is given."""
+    return np.array([np.interp(place, start, axis) for axis in curve.T])
+
+
+def _told_apart(vertices: list[_Vertex], start: Floats, curve: Floats) -> list[_Vertex]:
+    """Return vertices in order on a curve, evenly spaced if some are at one place."""
+    ends = curve[:1], [vertex.point for vertex in vertices], curve[-1:]
+    gaps = np.linalg.norm(np.diff(np.concatenate([each for each in ends if len(each)]), axis=0), axis=1)
+    if len(vertices) == 0 or gaps.min() > _LEAST_GAP * start[-1] / len(gaps):
+        return vertices
+    for vertex, place in zip(vertices, np.linspace(0.0, start[-1], len(vertices) + 2)[1:-1].tolist(), strict=True):
+        vertex.place, vertex.point = place, _at(place, start, curve)
     return vertices
 
 

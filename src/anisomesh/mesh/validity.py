@@ -70,6 +70,11 @@ class Validity:
     self_intersections_input: int
     new_intersections: int
 
+    @property
+    def faults(self) -> int:
+        """Number of inverted and flat triangles and of new intersections, which a remesh is to avoid."""
+        return self.inverted + self.new_intersections + self.flat
+
     def as_dict(self) -> dict[str, Any]:
         """Return a dictionary of all fields, for JSON."""
         return asdict(self)
