@@ -108,7 +108,7 @@ def remesh(
     n_vertices, ratio, max_error = read_target(n_vertices, ratio, max_error, options)
     with run.stage("load") if isinstance(mesh, str | os.PathLike) else nullcontext():
         given = mesh_of(mesh, faces)
-    cut = _cut(given, options, run, joined=options.lock is None)
+    cut = _cut(given, options, run, joined=True)
     prepared, remeshed = cut.whole.surface, partial(_joined_or_apart, given, cut)
     if max_error is not None:
         options = replace(options, denoise=False)  # the distance asked for refers to the input itself
@@ -217,7 +217,7 @@ def _remesh(
         validity=validity,
         seconds=run.total_seconds(),
         warnings=(
-            *losses_of_repair(prepared.report, joined=junctions is not None),
+            *losses_of_repair(prepared.report, joined=cut.whole.junctions is not None),
             *cut.remarks,
             *measured.remarks,
             *field.remarks,

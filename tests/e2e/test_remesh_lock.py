@@ -7,7 +7,7 @@ import anisomesh
 from anisomesh import Mesh, Regions, Surface
 from anisomesh.errors import OptionError
 from anisomesh.io.meshes import load_mesh, save
-from anisomesh.shapes.analytic import box, sphere
+from anisomesh.shapes.analytic import box, open_patch, sphere, torus
 
 BOX, BALL = box((1.0, 0.7, 0.5), n=8), sphere(3)
 
@@ -182,6 +182,16 @@ def test_too_few_vertices_are_refused():
         anisomesh.remesh(carrying(BOX), n_vertices=50, lock="top")
     with pytest.raises(OptionError, match="it has no regions"):
         anisomesh.remesh(BOX, n_vertices=50, lock="top")
+
+
+@pytest.mark.parametrize("surface", [torus(n_major=48, n_minor=24), open_patch(lambda x, y: 0.0 * x, 24)])
+def test_beside_a_fine_locked_half_the_other_has_the_vertices_that_its_sizes_take(surface):
+    """By symmetry half the vertices that the whole takes; the border counts as locked."""
+    h, mask = 1.2 * surface.edge_lengths.mean(), middles(surface)[:, 0] > 0.0
+    how = {"size_field": np.full(surface.n_points, h), "metric": "uniform", "max_iterations": 2, "fit": False}
+    whole, half = (anisomesh.remesh(surface, **how, **more) for more in ({}, {"lock": mask}))
+    more = half.surface.n_points - len(np.unique(surface.faces[mask]))
+    assert more == pytest.approx(0.5 * whole.surface.n_points, rel=0.1)
 
 
 @pytest.mark.slow
