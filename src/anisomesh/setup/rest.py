@@ -17,10 +17,10 @@ from anisomesh.mesh.geometry import sums_at_points
 from anisomesh.mesh.surface import Surface
 from anisomesh.mesh.topology import corner_fans, edge_keys, side_pairs
 from anisomesh.mesh.weld import coincident
-from anisomesh.options import MIN_VERTICES
 from anisomesh.resolve import is_designed
 from anisomesh.setup.inputs import PreparedInput
 
+_FEWEST = 3  # vertices of a part that is one triangle
 _APART = 1e-9  # of the size of the faces at a point: distance of copies of it from where it is, to tell them apart
 
 
@@ -95,7 +95,7 @@ def rest_of(whole: PreparedInput, locked: FaceMask) -> Rest:
         seams=whole.seams[edge],
         fixed=fixed if junctions is None else fixed | junctions.graph.nodes,
         outline=outline,
-        least=max(MIN_VERTICES, int(n_fixed)),
+        least=max(_FEWEST, int(n_fixed)),
     )
     return Rest(rest, source, kept)
 

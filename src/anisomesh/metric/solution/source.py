@@ -102,7 +102,9 @@ class SolutionMetric:
         patches = smooth_patches(surface, self.crease_angle, _RINGS)
         hessians = recovered_hessians(patches.surface, values[patches.source])
         largest = float(np.abs(np.linalg.eigvalsh(hessians)).max(initial=0.0))
-        if largest * surface.diagonal**2 <= _SUM_ROUNDING * float(np.abs(values).max(initial=0.0)) * _cells(surface):
+        if largest * surface.diagonal**2 <= _SUM_ROUNDING * float(np.abs(values).max(initial=0.0)) * _cells(
+            surface
+        ):
             remark = "the values have no second derivatives beyond rounding, so the mesh is not adapted to them"
             return MetricField(tensors=np.tile(np.eye(3), (surface.n_points, 1, 1)), remarks=(remark,))
         return patches.field(
