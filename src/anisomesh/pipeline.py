@@ -20,6 +20,7 @@ from anisomesh.caveats import (
     losses_of_repair,
     losses_of_shape,
     unfollowed_sizes,
+    unused_metric,
 )
 from anisomesh.counts.search import smallest_within
 from anisomesh.delaunay.meshing import ValidMesh
@@ -118,6 +119,7 @@ def remesh(
             return remeshed(n, options, run, nearest=True)
 
         result = smallest_within(with_vertices, prepared, max_error, deadline, least=cut.least)
+        result = replace(result, warnings=(*unused_metric(options), *result.warnings))
     elif n_vertices is None and ratio is None:
         n = max(cut.least, cut.n_more + count_for_length(cut.rest, options, run))
         result = remeshed(n, options, run, asked=options.absolute_length)

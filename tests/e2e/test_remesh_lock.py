@@ -161,13 +161,16 @@ def test_what_locked_faces_carry_is_the_same(lock):
     ("lock", "message"),
     [
         ("bottom", r"lock = 'bottom' is no region of the mesh; its regions are 'top', 'part 9'"),
-        (5, r"lock = 5 is no region of the mesh"),
+        (5, r"lock = 5 is no region of the mesh; .*; groups of lines or points cannot be selected"),
         (0.5, r"lock = 0.5; expected the name or label of a region"),
         (
             np.zeros(BOX.n_faces, dtype=bool),
             r"lock is a mask that selects no face; leave it out, or its regions are 'top'",
         ),
-        (np.ones(3, dtype=bool), r"lock is a mask of shape \(3,\); expected"),
+        (
+            np.ones(3, dtype=bool),
+            r"lock is a mask of shape \(3,\); expected .* a value for each triangle after reading",
+        ),
     ],
 )
 def test_regions_that_do_not_exist_are_refused(lock, message):
@@ -182,6 +185,21 @@ def test_too_few_vertices_are_refused():
         anisomesh.remesh(carrying(BOX), n_vertices=50, lock="top")
     with pytest.raises(OptionError, match="it has no regions"):
         anisomesh.remesh(BOX, n_vertices=50, lock="top")
+
+
+@pytest.mark.parametrize("left", [1, 2])
+def test_all_but_some_faces_can_be_locked_and_the_count_is_the_one_asked_for_or_a_warning(left):
+    mask = np.ones(BALL.n_faces, dtype=bool)
+    first = BALL.faces[100]
+    beside = np.array([np.isin(face, first).sum() == 2 for face in BALL.faces])
+    mask[[100, np.flatnonzero(beside)[0]][:left]] = False
+    for n in (BALL.n_points, BALL.n_points + 3):
+        result = anisomesh.remesh(BALL, n_vertices=n, lock=mask, max_iterations=2)
+        assert_locked(result, BALL, mask, result.surface.n_points)
+        told = any(f"{result.surface.n_points} vertices instead of {n}" in each for each in result.warnings)
+        assert told == (result.surface.n_points != n)
+    with pytest.raises(OptionError, match=f"have {BALL.n_points};"):
+        anisomesh.remesh(BALL, n_vertices=BALL.n_points - 1, lock=mask)
 
 
 @pytest.mark.parametrize("surface", [torus(n_major=48, n_minor=24), open_patch(lambda x, y: 0.0 * x, 24)])
