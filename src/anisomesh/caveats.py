@@ -94,6 +94,13 @@ def lengths_beyond(surface: Surface, options: RemeshOptions, max_error: float | 
             )
 
 
+def unused_metric(options: RemeshOptions) -> Iterator[str]:
+    """Yield a sentence if sizes or tensors are prescribed, for a mesh of which the distance is prescribed too."""
+    if options.size_field is not None or options.has_tensors:
+        what = "sizes" if options.size_field is not None else "tensors"
+        yield f"with max_error only the distance counts: edges do not have the lengths that the {what} ask for"
+
+
 def losses_of_attributes(before: Mesh, after: Mesh) -> Iterator[str]:
     """Yield one sentence for everything that a mesh carries in another form than the mesh it was made from, or not."""
     moved = sorted(set(after.corner_data) - set(before.corner_data))
@@ -148,9 +155,10 @@ def caveats(
             f"{n:,} vertices are too few for the topology of the surface; the input itself was coarsened instead, and "
             "its triangles do not follow the metric: ask for more vertices"
         )
-    if abs(n_points - n) > COUNT_TOLERANCE * n:
+    stays = options.lock is not None or options.keep_points is not None
+    if abs(n_points - n) > (0.0 if stays else COUNT_TOLERANCE * n):
         why = "fewer would fold the surface or change its topology" if n_points > n else "it has no more"
-        yield f"{n_points:,} vertices instead of {n:,}: {why}"
+        yield f"{n_points:,} vertices instead of {n:,}: {why}{', beside what stays' if stays else ''}"
     if validity.euler != validity.euler_input:
         yield f"the Euler characteristic is {validity.euler} instead of {validity.euler_input}; ask for more vertices"
     if validity.flat:

@@ -20,6 +20,7 @@ from anisomesh.caveats import (
     losses_of_repair,
     losses_of_shape,
     unfollowed_sizes,
+    unused_metric,
 )
 from anisomesh.counts.search import smallest_within
 from anisomesh.delaunay.meshing import ValidMesh
@@ -108,7 +109,7 @@ def remesh(
     n_vertices, ratio, max_error = read_target(n_vertices, ratio, max_error, options)
     with run.stage("load") if isinstance(mesh, str | os.PathLike) else nullcontext():
         given = mesh_of(mesh, faces)
-    cut = _cut(given, options, run, joined=options.lock is None)
+    cut = _cut(given, options, run, joined=True)
     prepared, remeshed = cut.whole.surface, partial(_joined_or_apart, given, cut)
     if max_error is not None:
         options = replace(options, denoise=False)  # the distance asked for refers to the input itself
@@ -118,6 +119,7 @@ def remesh(
             return remeshed(n, options, run, nearest=True)
 
         result = smallest_within(with_vertices, prepared, max_error, deadline, least=cut.least)
+        result = replace(result, warnings=(*unused_metric(options), *result.warnings))
     elif n_vertices is None and ratio is None:
         n = max(cut.least, cut.n_more + count_for_length(cut.rest, options, run))
         result = remeshed(n, options, run, asked=options.absolute_length)
@@ -194,6 +196,7 @@ def _remesh(
     if made is None:
         return None
     mesh, optimised = made.mesh, made.optimised
+    is_joined = cut.whole.junctions is not None and (junctions is None or made.joined)
     agreement = _agreement(mesh, tasks, asked) if asked or task.error_weights is not None else None
     rest, reference = (Surface(source.to_model(each.points, frame), each.faces) for each in (mesh, measured.surface))
     surface, validity = cut.checked(rest, reference, made.validity, run.deadline)
@@ -220,7 +223,7 @@ def _remesh(
         validity=validity,
         seconds=run.total_seconds(),
         warnings=(
-            *losses_of_repair(prepared.report, joined=made.joined),
+            *losses_of_repair(prepared.report, joined=is_joined),
             *cut.remarks,
             *measured.remarks,
             *field.remarks,

@@ -99,7 +99,7 @@ def test_what_the_file_carries_is_listed(run_cli, facts, tmp_path):
     assert (found["fixed_points"], found["unit"]) == (2, None)
     text = run_cli("info", tmp_path / "in.vtu").stdout
     for words in (
-        "physical: 3 (1, inlet, 3)",
+        "physical: 3 (1, inlet = 2, 3)",
         "temperature (float64), velocity (float64 x 3)",
         "count (int32)",
         f"{len(line)} edges of length 1",

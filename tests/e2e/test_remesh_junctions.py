@@ -3,6 +3,7 @@
 import numpy as np
 import pytest
 from junction_shapes import SHAPES, lengths_by_count
+from scipy.spatial import cKDTree
 
 import anisomesh
 from anisomesh.attributes.model import Mesh, Regions
@@ -120,9 +121,23 @@ def test_points_to_keep_on_a_junction_are_vertices_of_all_its_sheets(name):
     assert (found.sum(axis=0) == 1).all()
 
 
-def test_beside_locked_faces_sheets_stay_apart_and_that_is_said():
-    surface = Surface(*SHAPES["two_boxes"]())
-    lock = np.arange(surface.n_faces) < 10
-    result = anisomesh.remesh(surface, n_vertices=200, lock=lock, threads=1)
-    assert result.validity.nonmanifold_edges == 0
-    assert any("separate" in warning for warning in result.warnings)
+@pytest.mark.parametrize(
+    ("name", "lock"),
+    [("wavy_fin", "far"), ("tee", "at the junction"), ("book", "at the junction"), ("two_boxes", "far")],
+)
+def test_sheets_are_joined_beside_locked_faces_and_to_them(name, lock):
+    """Junctions that locked faces touch keep their edges; all others are joined as without a lock."""
+    surface = Surface(*SHAPES[name]())
+    junction = surface.points[np.unique(surface.edges[surface.edge_face_count > 2])]
+    middles = surface.points[surface.faces].mean(axis=1)
+    away = cKDTree(junction).query(middles)[0]
+    mask = away > 0.8 * away.max() if lock == "far" else away < 0.3 * away.max()
+    n = round(0.8 * surface.n_points)
+    result = anisomesh.remesh(surface, n_vertices=n, lock=mask, threads=1, max_iterations=5)
+    check_joined(surface, result, n)
+    assert not any("separate" in warning for warning in result.warnings)
+    before, after = (
+        {tuple(sorted(map(tuple, corners))) for corners in each.tolist()}
+        for each in (surface.points[surface.faces[mask]], result.surface.points[result.surface.faces])
+    )
+    assert before <= after

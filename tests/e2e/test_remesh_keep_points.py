@@ -52,6 +52,22 @@ def test_points_stay_exactly_where_they_are(surface, how):
     assert result.surface.n_points == how["n_vertices"]
 
 
+def test_points_can_be_a_mask():
+    kept = some_points(BOX, 5)
+    mask = np.isin(np.arange(BOX.n_points), kept)
+    result = anisomesh.remesh(BOX, n_vertices=60, keep_points=mask, max_iterations=2)
+    assert_kept(result, BOX.points[kept])
+    with pytest.raises(OptionError, match=r"keep_points is a mask of shape \(3,\); expected"):
+        anisomesh.remesh(BOX, n_vertices=60, keep_points=mask[:3])
+
+
+def test_a_count_that_is_not_the_one_asked_for_is_said():
+    kept = some_points(BALL, 200)
+    result = anisomesh.remesh(BALL, n_vertices=200, keep_points=kept, max_iterations=2)
+    told = any(f"{result.surface.n_points} vertices instead of 200" in each for each in result.warnings)
+    assert told == (result.surface.n_points != 200)
+
+
 def test_points_stay_where_noise_is_removed():
     ball = noisy_ball()
     kept = some_points(ball, 10)

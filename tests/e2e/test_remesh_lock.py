@@ -7,7 +7,7 @@ import anisomesh
 from anisomesh import Mesh, Regions, Surface
 from anisomesh.errors import OptionError
 from anisomesh.io.meshes import load_mesh, save
-from anisomesh.shapes.analytic import box, sphere
+from anisomesh.shapes.analytic import box, open_patch, sphere, torus
 
 BOX, BALL = box((1.0, 0.7, 0.5), n=8), sphere(3)
 
@@ -161,13 +161,16 @@ def test_what_locked_faces_carry_is_the_same(lock):
     ("lock", "message"),
     [
         ("bottom", r"lock = 'bottom' is no region of the mesh; its regions are 'top', 'part 9'"),
-        (5, r"lock = 5 is no region of the mesh"),
+        (5, r"lock = 5 is no region of the mesh; .*; groups of lines or points cannot be selected"),
         (0.5, r"lock = 0.5; expected the name or label of a region"),
         (
             np.zeros(BOX.n_faces, dtype=bool),
             r"lock is a mask that selects no face; leave it out, or its regions are 'top'",
         ),
-        (np.ones(3, dtype=bool), r"lock is a mask of shape \(3,\); expected"),
+        (
+            np.ones(3, dtype=bool),
+            r"lock is a mask of shape \(3,\); expected .* a value for each triangle after reading",
+        ),
     ],
 )
 def test_regions_that_do_not_exist_are_refused(lock, message):
@@ -182,6 +185,31 @@ def test_too_few_vertices_are_refused():
         anisomesh.remesh(carrying(BOX), n_vertices=50, lock="top")
     with pytest.raises(OptionError, match="it has no regions"):
         anisomesh.remesh(BOX, n_vertices=50, lock="top")
+
+
+@pytest.mark.parametrize("left", [1, 2])
+def test_all_but_some_faces_can_be_locked_and_the_count_is_the_one_asked_for_or_a_warning(left):
+    mask = np.ones(BALL.n_faces, dtype=bool)
+    first = BALL.faces[100]
+    beside = np.array([np.isin(face, first).sum() == 2 for face in BALL.faces])
+    mask[[100, np.flatnonzero(beside)[0]][:left]] = False
+    for n in (BALL.n_points, BALL.n_points + 3):
+        result = anisomesh.remesh(BALL, n_vertices=n, lock=mask, max_iterations=2)
+        assert_locked(result, BALL, mask, result.surface.n_points)
+        told = any(f"{result.surface.n_points} vertices instead of {n}" in each for each in result.warnings)
+        assert told == (result.surface.n_points != n)
+    with pytest.raises(OptionError, match=f"have {BALL.n_points};"):
+        anisomesh.remesh(BALL, n_vertices=BALL.n_points - 1, lock=mask)
+
+
+@pytest.mark.parametrize("surface", [torus(n_major=48, n_minor=24), open_patch(lambda x, y: 0.0 * x, 24)])
+def test_beside_a_fine_locked_half_the_other_has_the_vertices_that_its_sizes_take(surface):
+    """By symmetry half the vertices that the whole takes; the border counts as locked."""
+    h, mask = 1.2 * surface.edge_lengths.mean(), middles(surface)[:, 0] > 0.0
+    how = {"size_field": np.full(surface.n_points, h), "metric": "uniform", "max_iterations": 2, "fit": False}
+    whole, half = (anisomesh.remesh(surface, **how, **more) for more in ({}, {"lock": mask}))
+    more = half.surface.n_points - len(np.unique(surface.faces[mask]))
+    assert more == pytest.approx(0.5 * whole.surface.n_points, rel=0.1)
 
 
 @pytest.mark.slow

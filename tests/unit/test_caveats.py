@@ -5,7 +5,7 @@ import pytest
 
 import anisomesh
 from anisomesh import Mesh, Regions
-from anisomesh.caveats import losses_of_attributes, losses_of_shape
+from anisomesh.caveats import losses_of_attributes, losses_of_shape, unused_metric
 from anisomesh.setup.inputs import prepared_input
 from anisomesh.shapes import analytic as shapes
 
@@ -140,3 +140,12 @@ def test_a_length_larger_than_the_model_is_said(asked):
     for fine in ({"edge_length": 0.5}, {"size_field": np.full(ball.n_points, 9.0), "n_vertices": 50}):
         result = anisomesh.remesh(ball, embedding="direct", metric="uniform", **fine)
         assert not any("larger than" in line for line in result.warnings)
+
+
+def test_a_distance_that_is_asked_for_together_with_sizes_or_tensors_is_said_to_count_alone():
+    options = anisomesh.RemeshOptions(size_field=np.ones(4), metric="uniform")
+    assert list(unused_metric(options)) == [
+        "with max_error only the distance counts: edges do not have the lengths that the sizes ask for"
+    ]
+    assert "tensors" in next(unused_metric(anisomesh.RemeshOptions(metric=np.tile(np.eye(3), (4, 1, 1)))))
+    assert not list(unused_metric(anisomesh.RemeshOptions()))

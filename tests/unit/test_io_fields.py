@@ -101,6 +101,32 @@ def test_nine_components_are_read_row_by_row(tmp_path, suffix):
     np.testing.assert_allclose(load_field(path).points, SURFACE.points, rtol=1e-15)
 
 
+def test_an_array_of_integers_is_read_and_what_cannot_be_used_is_said_in_plain_words(tmp_path):
+    path = tmp_path / "a.npy"
+    np.save(path, np.arange(1, 8))
+    np.testing.assert_array_equal(load_field(path).values, np.arange(1.0, 8.0))
+    for content, words in {
+        b"xxxx": "it is no array that numpy.save has written",
+        path.read_bytes()[:-5]: "or is truncated",
+    }.items():
+        path.write_bytes(content)
+        with pytest.raises(MeshFileError, match=f"a.npy: cannot be read as NPY: .*{words}"):
+            load_field(path)
+    np.save(path, np.array([{}, 1], dtype=object))
+    with pytest.raises(MeshFileError, match="it holds Python objects"):
+        load_field(path)
+    np.save(path, np.ones((7, 4)))
+    with pytest.raises(MeshFileError, match=r"a.npy: it cannot be used; expected a number .* of shape \(7, 4\)"):
+        load_field(path)
+
+
+def test_the_layout_of_tensors_of_the_plane_is_the_one_that_was_read(tmp_path):
+    (tmp_path / "a.sol").write_text("MeshVersionFormatted 2 Dimension 2 SolAtVertices 1 1 3 4 1 9 End")
+    assert load_field(tmp_path / "a.sol").layout.startswith("m11 m12 m22, ")
+    (tmp_path / "a.sol").write_text(HEAD + "SolAtVertices\n1\n1 3\n11 12 22 13 23 33\nEnd\n")
+    assert load_field(tmp_path / "a.sol").layout == "m11 m12 m22 m13 m23 m33"
+
+
 def test_six_components_elsewhere_are_refused_since_their_order_is_unknown(tmp_path):
     save(SURFACE, tmp_path / "a.ply", point_data={"M": ROWS})
     np.save(tmp_path / "a.npy", ROWS)
@@ -146,7 +172,7 @@ def test_files_that_hold_no_field_are_refused(tmp_path):
         np.savez(file, h=np.ones(N))
     for name, words in {
         "a.mesh": "it has no field at points",
-        "a.npy": "none of them can be used",
+        "a.npy": "it cannot be used",
         "b.npy": "cannot be read as NPY",
         "c.npy": "cannot be read as NPY",
         "d.npy": "cannot be read as NPY",

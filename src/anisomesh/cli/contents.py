@@ -60,7 +60,9 @@ def contents_rows(facts: dict[str, Any]) -> list[tuple[str, str]]:
     """Return the lines of text for :func:`contents`, of what there is."""
     rows = [("unit", facts["unit"])] if facts["unit"] else []
     for name, regions in facts["regions"].items():
-        texts = [str(region["name"] or region["label"]) for region in regions]
+        texts = [
+            f"{region['name']} = {region['label']}" if region["name"] else str(region["label"]) for region in regions
+        ]
         more = f" and {len(texts) - _MAX_NAMED:,} more" if len(texts) > _MAX_NAMED else ""
         rows.append(("regions", f"{name}: {len(texts):,} ({', '.join(texts[:_MAX_NAMED])}{more})"))
     for kind, title in _DATA_TITLES.items():

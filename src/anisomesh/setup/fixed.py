@@ -63,15 +63,23 @@ def with_fixed_points(mesh: Mesh, prepared: Prepared, options: RemeshOptions) ->
 
 
 def checked_points(name: str, values: npt.ArrayLike | None, n_points: int) -> Ints:
-    """Return points of a mesh as integers (n,), each once, or raise OptionError unless they are."""
+    """Return points of a mesh, given as integers or a mask (V,), as integers (n,), each once, or raise OptionError."""
     if values is None:
         return np.zeros(0, dtype=np.int64)
     given: npt.NDArray[Any] = np.asarray(values)
+    if given.dtype == bool:
+        if given.shape != (n_points,):
+            raise OptionError(
+                f"{name} is a mask of shape {given.shape}; expected ({n_points},), a value for each point, or numbers "
+                "of points"
+            )
+        return np.flatnonzero(given).astype(np.int64)
     if given.size == 0:
         return np.zeros(0, dtype=np.int64)
     if given.ndim != 1 or given.dtype.kind not in "iu":
         raise OptionError(
-            f"{name} has shape {given.shape} and type {given.dtype}; expected (n,) whole numbers, a point each"
+            f"{name} has shape {given.shape} and type {given.dtype}; expected (n,) whole numbers, a point each, or a "
+            f"mask ({n_points},) of bools"
         )
     wrong = given[(given < 0) | (given >= n_points)]
     if len(wrong):

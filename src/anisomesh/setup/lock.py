@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
@@ -15,22 +15,18 @@ from anisomesh.attributes.model import Ints, Mesh
 from anisomesh.errors import OptionError
 from anisomesh.execution.deadline import NO_DEADLINE, Deadline
 from anisomesh.mesh.closest_points import ClosestPoints
-from anisomesh.mesh.geometry import sums_at_points
 from anisomesh.mesh.surface import Surface
-from anisomesh.mesh.topology import corner_fans, edge_keys, side_pairs
 from anisomesh.mesh.validity import Validity, check_validity
-from anisomesh.mesh.weld import coincident
 from anisomesh.meshops.anchors import places_found
 from anisomesh.meshops.held import Held
 from anisomesh.meshops.inverted import remove_inverted_triangles
 from anisomesh.meshops.self_intersections import remove_self_intersections
-from anisomesh.options import MIN_VERTICES, RemeshOptions
+from anisomesh.options import RemeshOptions
 from anisomesh.repair.near_points import weld_distance
 from anisomesh.repair.prepare import Prepared
 from anisomesh.setup.inputs import PreparedInput
+from anisomesh.setup.rest import rest_of
 from anisomesh.setup.selection import selected_faces
-
-_APART = 1e-9  # of the size of the faces at a point: distance of copies of it from where it is, to tell them apart
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -45,8 +41,10 @@ class Cut:
         What is remeshed: the faces that are not locked, with its border to the others as its outline. The input itself
         if no face is locked, or all are.
     source
-        Point of the whole surface at each point of the rest (V',). Several are copies of one where the faces of the
-        rest at it are apart; these have slightly different coordinates.
+        Point of the sheets of the whole at each point of the rest (V',). Several are copies of one where the faces of
+        the rest at it are apart; these have slightly different coordinates.
+    kept
+        Points (n,) of the whole, its sheets joined, on junctions that stay since locked faces touch them.
     locked
         Which faces of the whole surface (F,) stay as they are.
     face_source
@@ -60,6 +58,7 @@ class Cut:
     whole: PreparedInput
     rest: PreparedInput
     source: Ints
+    kept: Ints
     locked: FaceMask
     face_source: Ints
     remarks: tuple[str, ...]
@@ -72,12 +71,12 @@ class Cut:
 
     @cached_property
     def points(self) -> Ints:
-        """Points of the whole surface (n,) on locked faces; they are the first ones of the result."""
-        return np.unique(self.whole.prepared.surface.faces[self.locked]).astype(np.int64)
+        """Points (n,) of the whole, its sheets joined, that stay; they are the first ones of the result."""
+        return np.union1d(self.whole.surface.faces[self.locked], self.kept).astype(np.int64)
 
     @cached_property
     def _border(self) -> PointMask:
-        """Which points of the rest (V',) are on locked faces."""
+        """Which points of the rest (V',) are on locked faces or junctions that stay."""
         surface = self.rest.prepared.surface
         mask = np.zeros(surface.n_points, dtype=bool)
         mask[surface.edges[self.rest.outline]] = True
@@ -106,8 +105,9 @@ class Cut:
         if self.is_all:
             return self.rest.least
         if n_vertices < self.least:
+            junctions = ", the junctions of sheets that they touch," if len(self.kept) else ""
             raise OptionError(
-                f"{n_vertices:,} vertices are asked for, and the locked regions and points to keep have "
+                f"{n_vertices:,} vertices are asked for, and the locked regions{junctions} and points to keep have "
                 f"{self.least:,}; ask for more, or lock less"
             )
         return n_vertices - self.n_more
@@ -116,16 +116,29 @@ class Cut:
         """Return a mesh of the rest, in model units, together with the locked faces, which come first."""
         if not self.locked.any():
             return rest
-        surface = self.whole.prepared.surface
-        points = surface.points[self.points]
-        faces = np.searchsorted(self.points, surface.faces[self.locked])
+        junctions = self.whole.junctions
+        source = self.source if junctions is None or self.is_all else junctions.joined[self.source]
+        return self._joined_at(rest, self.whole.surface, self.points, source)
+
+    def _reference(self, rest: Surface) -> Surface:
+        """Return a surface of the rest, in model units, together with the locked faces, sheets apart."""
+        sheets = self.whole.prepared.surface
+        return self._joined_at(rest, sheets, np.unique(sheets.faces[self.locked]).astype(np.int64), self.source)
+
+    def _joined_at(self, rest: Surface, surface: Surface, held: Ints, source: Ints) -> Surface:
+        """Return a mesh of the rest joined to the locked faces of a surface at some of its points (n,).
+
+        ``source`` is the point of that surface at each point of the rest.
+        """
+        points, faces = surface.points[held], np.searchsorted(held, surface.faces[self.locked])
         if self.is_all:
             return Surface(points, faces)
         border = np.flatnonzero(self._border)
+        border = border[np.isin(source[border], held)]
         number = places_found(rest.points, self.rest.prepared.surface.points[border])
         shared = number >= 0
         index = len(points) + np.cumsum(~shared) - 1
-        index[shared] = np.searchsorted(self.points, self.source[border[number[shared]]])
+        index[shared] = np.searchsorted(held, source[border[number[shared]]])
         return Surface(np.concatenate([points, rest.points[~shared]]), np.concatenate([faces, index[rest.faces]]))
 
     def checked(
@@ -145,13 +158,14 @@ class Cut:
         Notes
         -----
         A mesh of the rest that is valid can be inverted against locked faces or intersect them, as on the other side of
-        a thin plate. Such faults are mended by local changes.
+        a thin plate. Such faults are mended by local changes, unless sheets are joined.
         """
         if not self.locked.any():
             return rest, validity
-        whole, expected = self.joined(rest), self.joined(reference)
-        validity = check_validity(whole, expected)
-        if validity.inverted + validity.new_intersections:
+        whole, expected = self.joined(rest), self._reference(reference)
+        is_cut = self.whole.junctions is not None
+        validity = check_validity(whole, expected, self.whole.surface if is_cut else None)
+        if validity.inverted + validity.new_intersections and not is_cut:
             mended = self._mended(whole, ClosestPoints(expected), deadline)
             after = check_validity(mended, expected)
             if after.inverted + after.new_intersections < validity.inverted + validity.new_intersections:
@@ -171,7 +185,10 @@ class Cut:
         """Return a result with everything that the given mesh carries on locked faces and their points."""
         if not self.locked.any():
             return mesh
-        points = self.whole.prepared.point_source[self.points].astype(np.int64)
+        source, junctions = self.whole.prepared.point_source, self.whole.junctions
+        if junctions is not None:
+            source = source[np.unique(junctions.joined, return_index=True)[1]]
+        points = source[self.points].astype(np.int64)
         return with_first_rows(mesh, given, points, self.face_source, self.weld)
 
 
@@ -197,11 +214,13 @@ def cut_locked(whole: PreparedInput, mesh: Mesh, options: RemeshOptions) -> Cut:
     if locked.all():
         remarks.append("all faces are locked: the result is the input")
     is_part = locked.any() and not locked.all()
-    rest, source = _rest_of(whole, locked) if is_part else (whole, np.arange(surface.n_points))
+    none = np.zeros(0, dtype=np.int64)
+    rest, source, kept = rest_of(whole, locked) if is_part else (whole, np.arange(surface.n_points), none)
     return Cut(
         whole=whole,
         rest=rest,
         source=source,
+        kept=kept,
         locked=locked,
         face_source=face_source,
         remarks=tuple(remarks),
@@ -223,51 +242,3 @@ def _rows_found(rows: npt.NDArray[np.integer], known: npt.NDArray[np.integer]) -
     number = np.full(code.max() + 1, -1)
     number[code.ravel()[: len(known)]] = np.arange(len(known))
     return np.asarray(number[code.ravel()[len(known) :]])
-
-
-def _rest_of(whole: PreparedInput, locked: FaceMask) -> tuple[PreparedInput, Ints]:
-    """Return the part of an input that is not locked, and the point of the whole at each of its points (V',)."""
-    surface = whole.prepared.surface
-    faces = surface.faces[~locked]
-    n_fans, fan = corner_fans(faces, side_pairs(faces))
-    source = np.empty(n_fans, dtype=np.int64)
-    source[fan] = faces.ravel()
-    order = np.argsort(source, kind="stable")
-    position = np.empty(n_fans, dtype=np.int32)
-    position[order] = np.arange(n_fans)
-    source = source[order]
-    part = Surface(surface.points[source], position[fan].reshape(-1, 3))
-    edge = np.searchsorted(edge_keys(surface.edges), edge_keys(source[part.edges]))
-    outline = (part.edge_face_count == 1) & (surface.edge_face_count[edge] == 2)
-    border = np.zeros(n_fans, dtype=bool)
-    border[part.edges[outline]] = True
-    fixed = whole.fixed[source] | border
-    part = _told_apart(part, border)
-    rest = replace(
-        whole,
-        prepared=replace(whole.prepared, surface=part, point_source=whole.prepared.point_source[source]),
-        tensors=None if whole.tensors is None else whole.tensors[source],
-        density=None if whole.density is None else whole.density[source],
-        sizes=None if whole.sizes is None else whole.sizes[source],
-        tagged=whole.tagged[edge],
-        borders=whole.borders[edge],
-        seams=whole.seams[edge],
-        fixed=fixed,
-        outline=outline,
-        least=max(MIN_VERTICES, int(np.count_nonzero(fixed))),
-    )
-    return rest, source
-
-
-def _told_apart(surface: Surface, border: PointMask) -> Surface:
-    """Return a surface whose border points (V,) at the same place are moved into their faces by next to nothing."""
-    label = coincident(surface.points)
-    several = border & (np.bincount(label, minlength=surface.n_points) > 1)[label]
-    if not several.any():
-        return surface
-    middle = surface.points[surface.faces].mean(axis=1)
-    count = sums_at_points(np.ones(surface.n_faces), surface.faces, surface.n_points)
-    inside = sums_at_points(middle, surface.faces, surface.n_points) / count[:, None]
-    points = np.array(surface.points)
-    points[several] += _APART * (inside - points)[several]
-    return surface.with_points(points)

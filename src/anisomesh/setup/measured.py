@@ -24,7 +24,7 @@ from anisomesh.metric.conformity import MetricExtent
 from anisomesh.metric.field import MetricField, MetricSource, checked_field
 from anisomesh.metric.narrow_patches import limit_to_patches
 from anisomesh.metric.sizes import checked_sizes, limited_sizes, metric_of_sizes
-from anisomesh.metric.transfer import field_near
+from anisomesh.metric.transfer import PlacedMetric, field_near
 from anisomesh.options import MIN_VERTICES, RemeshOptions
 from anisomesh.resolve import follows_creases, is_designed, metric_source, prescribes_sizes, with_embedding_chosen
 from anisomesh.setup.inputs import PreparedInput
@@ -78,15 +78,29 @@ def count_for_length(source: PreparedInput, options: RemeshOptions, run: Run) ->
     """Return the number of vertices that edges of the length in the options take on a prepared surface.
 
     The metric is measured on a surface that depends on the number, so it is measured again until that hardly changes.
+    The outline of the surface has the vertices that it has, and not as many as the length takes.
     """
     n, length = _FIRST_COUNT, float(options.absolute_length or 1.0)
     for _ in range(_COUNT_ROUNDS):
         measured = measure(source, n, options, run)
         extent = MetricExtent.of(measured.working, measured.field)
-        before, n = n, max(MIN_VERTICES, extent.count(length / unit_of_lengths(options, measured.frame)))
+        asked = length / unit_of_lengths(options, measured.frame)
+        before, n = n, max(MIN_VERTICES, extent.count(asked) + _more_on_outline(source, measured, asked))
         if abs(n - before) <= _COUNT_TOLERANCE * n:
             break
     return n
+
+
+def _more_on_outline(source: PreparedInput, measured: Measured, length: float) -> int:
+    """Return how many vertices more the outline of a surface has than edges of a length in the metric take there."""
+    surface = source.prepared.surface
+    outline = surface.edges[source.outline]
+    if len(outline) == 0:
+        return 0
+    ends = measured.frame.to_unit(surface.points)[outline]
+    roots = PlacedMetric(ClosestPoints(measured.working), measured.field).roots(ends.mean(axis=1))
+    lengths = np.linalg.norm(np.einsum("eij,ej->ei", roots, ends[:, 1] - ends[:, 0]), axis=1)
+    return len(outline) - round(float(lengths.sum()) / length)
 
 
 def unit_of_lengths(options: RemeshOptions, frame: Frame) -> float:

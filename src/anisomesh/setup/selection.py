@@ -51,7 +51,8 @@ def selected_faces(name: str, mesh: Mesh, selection: Any) -> FaceMask:
 def _mask(name: str, values: FaceMask, mesh: Mesh) -> FaceMask:
     if values.shape != (mesh.surface.n_faces,):
         raise OptionError(
-            f"{name} is a mask of shape {values.shape}; expected ({mesh.surface.n_faces},), a value for each face"
+            f"{name} is a mask of shape {values.shape}; expected ({mesh.surface.n_faces},), a value for each triangle "
+            "after reading, when polygons are split into triangles and other cells left out"
         )
     if not values.any():
         raise OptionError(f"{name} is a mask that selects no face; leave it out, or {_remedy(mesh)}")
@@ -69,7 +70,10 @@ def _faces_of(name: str, mesh: Mesh, wanted: Any) -> FaceMask:
     if not found.any() and isinstance(wanted, str) and wanted.lstrip("-").isdecimal():
         return _faces_of(name, mesh, int(wanted))
     if not found.any():
-        raise OptionError(f"{name} = {wanted!r} is no region of the mesh; {_remedy(mesh)}")
+        raise OptionError(
+            f"{name} = {wanted!r} is no region of the mesh; {_remedy(mesh)}; groups of lines or points cannot be "
+            "selected"
+        )
     return found
 
 

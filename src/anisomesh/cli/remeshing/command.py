@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from contextlib import nullcontext
 from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
@@ -21,7 +22,7 @@ from anisomesh.cli.arguments import (
 )
 from anisomesh.cli.job import STANDARD_STREAM, Outputs, check_input_format, default_output, read_mesh, run_remesh
 from anisomesh.cli.progress import progress
-from anisomesh.cli.remeshing.prescribed_metric import check_limits, file_of, prescribed_metric
+from anisomesh.cli.remeshing.prescribed_metric import MetricFile, check_limits, file_of, prescribed_metric
 from anisomesh.cli.report import as_json, hints, summary
 
 if TYPE_CHECKING:
@@ -205,7 +206,8 @@ def command(
         if prescribed is not None:
             display.note(prescribed.description)
             options |= prescribed.options_for(mesh, str(source), options["feature_angle"])
-        result, facts = run_remesh(mesh, display, name=str(source), load_seconds=seconds, **options)
+        with prescribed.named_in_errors() if isinstance(prescribed, MetricFile) else nullcontext():
+            result, facts = run_remesh(mesh, display, name=str(source), load_seconds=seconds, **options)
         facts["hints"] = hints(result.prepared)
         facts["options"] |= {name: None if path is None else str(path) for name, path in files.items()}
         if prescribed is not None:

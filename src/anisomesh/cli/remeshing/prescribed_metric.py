@@ -2,13 +2,15 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
+from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import typer
 
-from anisomesh.errors import MeshFileError
+from anisomesh.errors import MeshFileError, MetricError, OptionError
 
 if TYPE_CHECKING:
     from anisomesh.attributes.model import Mesh
@@ -140,6 +142,16 @@ class MetricFile:
         if field.kind == "scalar":
             return {"metric": "uniform", "size_field": field.values}
         return {"metric": field.values}
+
+    @contextmanager
+    def named_in_errors(self) -> Iterator[None]:
+        """Put the file before messages about values of the options that it gives."""
+        try:
+            yield
+        except (MetricError, OptionError) as error:
+            if not str(error).startswith(("metric", "size_field")):
+                raise
+            raise type(error)(f"{self.field.path}, field {self.field.name!r}: {error}") from error
 
 
 @dataclass(frozen=True)

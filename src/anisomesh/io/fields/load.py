@@ -7,7 +7,7 @@ import re
 from collections.abc import Collection, Mapping
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Literal
+from typing import BinaryIO, Literal
 
 import numpy as np
 import numpy.typing as npt
@@ -15,7 +15,7 @@ import numpy.typing as npt
 from anisomesh._arrays import Points
 from anisomesh.errors import MeshFileError
 from anisomesh.io.carried import Array
-from anisomesh.io.formats.medit.solution import read_sol
+from anisomesh.io.formats.medit.solution import PLANE, read_sol, sol_dimension
 from anisomesh.io.known_formats import MESH_FORMATS
 from anisomesh.io.meshes import load_mesh
 
@@ -91,10 +91,14 @@ def load_field(spec: str | os.PathLike[str], kinds: Collection[FieldKind] = ("sc
     path, name = split_spec(spec)
     data, points = _data(path)
     if name is None:
-        suitable = [key for key, values in data.items() if values.dtype.kind == "f" and _kind(path, values) in kinds]
+        types = "iuf" if path.suffix.lower() == ".npy" else "f"  # integers of meshes are labels, as a rule
+        suitable = [key for key, values in data.items() if values.dtype.kind in types and _kind(path, values) in kinds]
         if len(suitable) != 1:
-            reason = "name one" if suitable else "none of them can be used"
-            raise MeshFileError(f"{path}: {reason}, as in {path.name}:NAME; {_expected(kinds)}; {_listed(data)}")
+            unnamed = (
+                f"name one, as in {path.name}:NAME" if suitable else "it has no field that can be used without a name"
+            )
+            reason = "it cannot be used" if path.suffix.lower() == ".npy" else unnamed
+            raise MeshFileError(f"{path}: {reason}; {_expected(kinds)}; {_listed(data)}")
         (name,) = suitable
     elif name not in data:
         raise MeshFileError(f"{path}: it has no field {name!r} at points; {_listed(data)}")
@@ -105,7 +109,8 @@ def load_field(spec: str | os.PathLike[str], kinds: Collection[FieldKind] = ("sc
         raise MeshFileError(f"{path}: the field {name!r} is {_shape(values)}; {_expected(kinds)}{six}")
     layout = "XX YY ZZ XY YZ XZ" if values.shape[1:] == (6,) else "row by row" if kind == "tensor" else ""
     if path.suffix.lower() == ".sol" and kind == "tensor":
-        layout = "m11 m12 m22 m13 m23 m33"
+        planar = sol_dimension(path.read_bytes()) == PLANE
+        layout = "m11 m12 m22, and their mean for m33" if planar else "m11 m12 m22 m13 m23 m33"
     return PointField(path=path, name=name, kind=kind, values=_rows(values, kind), points=points, layout=layout)
 
 
@@ -125,12 +130,22 @@ def _data(path: Path) -> tuple[Mapping[str, Array], Points | None]:
     try:
         if suffix == ".npy":
             with path.open("rb") as file:
-                return {"array": np.lib.format.read_array(file, allow_pickle=False)}, None
+                return {"array": _array_of(file)}, None
         return {str(k): values for k, values in enumerate(read_sol(path.read_bytes()), start=1)}, None
     except OSError as error:
         raise MeshFileError(f"{path}: cannot be read: {error.strerror or error}") from error
     except (ValueError, EOFError) as error:
         raise MeshFileError(f"{path}: cannot be read as {suffix[1:].upper()}: {error}") from error
+
+
+def _array_of(file: BinaryIO) -> Array:
+    """Return the array in a NumPy file, or raise ValueError in words that do without NumPy's."""
+    try:
+        return np.asarray(np.lib.format.read_array(file, allow_pickle=False))
+    except (ValueError, EOFError) as error:
+        if "Object arrays" in str(error):
+            raise ValueError("it holds Python objects; expected an array of numbers") from error
+        raise ValueError("it is no array that numpy.save has written, or is truncated") from error
 
 
 def _kind(path: Path, values: Array) -> FieldKind | None:

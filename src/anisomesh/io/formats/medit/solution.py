@@ -13,6 +13,7 @@ import numpy.typing as npt
 from anisomesh.io.carried import Array
 from anisomesh.io.formats.words import format_rows
 
+PLANE = 2  # dimension of files whose points have two coordinates
 _SCALAR, _VECTOR, _TENSOR = 1, 2, 3  # types of fields
 _LOWER = {2: [(0, 0), (0, 1), (1, 1)], 3: [(0, 0), (0, 1), (1, 1), (0, 2), (1, 2), (2, 2)]}  # rows of the lower half
 _BINARY = (b"\x01\x00\x00\x00", b"\x00\x00\x00\x01")  # the number 1 in either byte order
@@ -33,17 +34,27 @@ def read_sol(data: bytes) -> list[Array]:
     """
     if data.startswith(_BINARY):
         raise ValueError("it is binary; save it as text, a .sol file beside a .mesh file")
-    tokens = re.sub(rb"#[^\n]*", b"", data).split()
+    tokens = _without_comments(data).split()
     if not tokens or not tokens[0].startswith(b"MeshVersionFormatted"):
         raise ValueError("it does not begin with MeshVersionFormatted as a MEDIT text file does")
     words = [k for k, token in enumerate(tokens) if token[:1].isalpha() and token.lower() not in (b"nan", b"inf")]
     sections = {tokens[k]: tokens[k + 1 : end] for k, end in zip(words, [*words[1:], len(tokens)], strict=True)}
-    dimension = int((sections.get(b"Dimension") or [b"3"])[0])
+    dimension = sol_dimension(data)
     if dimension not in _LOWER:
         raise ValueError(f"its dimension is {dimension}; expected 2 or 3")
     if b"SolAtVertices" not in sections:
         raise ValueError("it has no section SolAtVertices, the values at vertices")
     return _fields(sections[b"SolAtVertices"], dimension)
+
+
+def sol_dimension(data: bytes) -> int:
+    """Return the dimension that a file declares, 3 if it declares none."""
+    found = re.search(rb"\bDimension\s+(\d+)", _without_comments(data))
+    return 3 if found is None else int(found[1])
+
+
+def _without_comments(data: bytes) -> bytes:
+    return re.sub(rb"#[^\n]*", b"", data)
 
 
 def _fields(body: list[bytes], dimension: int) -> list[Array]:
