@@ -120,24 +120,28 @@ def _checked_pairs(input_mesh: Surface, pairs: npt.ArrayLike) -> npt.NDArray[np.
 def distance_to_crease_edges(
     surface: Surface, tagged: EdgeMask, mesh: Surface, crease_edges: npt.NDArray[np.int64]
 ) -> float:
-    """Return the largest distance from tagged edges to edges of a mesh along creases; 0 if nothing is tagged.
+    """Return the largest distance from tagged edges to edges of a mesh that follow them; 0 if nothing is tagged.
 
     Parameters
     ----------
     surface
         The surface.
     tagged
-        Its tagged edges (E,), of which the ends and middles are measured.
+        Its tagged edges (E,), of which the ends and middles are measured: on the boundary to the boundary of the mesh,
+        elsewhere to its edges along creases.
     mesh
         A mesh near the surface, in the same units.
     crease_edges
         Ends of the edges of the mesh along creases (n, 2); infinite if there are none.
     """
-    if not tagged.any():
-        return 0.0
-    if len(crease_edges) == 0:
-        return float("inf")
-    ends = surface.points[surface.edges[tagged]]
-    places = np.concatenate([ends[:, 0], ends[:, 1], ends.mean(axis=1)])
-    squares, _, _ = igl.point_mesh_squared_distance(places, mesh.points, crease_edges)
-    return float(np.sqrt(squares.max()))
+    inside, largest = surface.edge_face_count != 1, 0.0
+    boundary = mesh.edges[mesh.edge_face_count == 1].astype(np.int64)
+    for chosen, lines in ((tagged & inside, crease_edges), (tagged & ~inside, boundary)):
+        if chosen.any() and len(lines) == 0:
+            return float("inf")
+        if chosen.any():
+            ends = surface.points[surface.edges[chosen]]
+            places = np.concatenate([ends[:, 0], ends[:, 1], ends.mean(axis=1)])
+            squares, _, _ = igl.point_mesh_squared_distance(places, mesh.points, lines)
+            largest = max(largest, float(np.sqrt(squares.max())))
+    return largest
