@@ -135,8 +135,8 @@ def _lost_curves(before: Mesh, after: Mesh) -> Iterator[str]:
     """Yield a sentence if no edge of the result is in a region of prescribed edges."""
     lost = []
     for division, regions in before.feature_regions.items():
-        present = after.feature_regions[division].labels if division in after.feature_regions else []
-        gone = np.setdiff1d(regions.labels, [0, *present])
+        found = after.feature_regions.get(division)
+        gone = np.setdiff1d(regions.labels, 0 if found is None else np.append(found.labels, 0))
         lost += [regions.names.get(label, f"{division} {label}") for label in gone.tolist()]
     if lost:
         more = f" and {len(lost) - _MAX_NAMED:,} more" if len(lost) > _MAX_NAMED else ""
