@@ -134,6 +134,18 @@ def test_medit(tmp_path, caplog):
     assert "left out its sections Tangents" in caplog.text
 
 
+def test_an_edge_in_two_regions_keeps_the_first_that_it_has(tmp_path, caplog):
+    edges = "Edges\n5\n4 2 0\n2 4 5\n4 2 6\n4 3 0\n3 1 0\nRidges\n1\n1\nRequiredEdges\n1\n4\n"
+    mesh = read(tmp_path, "a.mesh", MEDIT[: MEDIT.index("Edges")] + edges + MEDIT[MEDIT.index("Corners") :])
+    assert dict(
+        zip(map(tuple, np.sort(mesh.features).tolist()), mesh.feature_regions["reference"].labels, strict=True)
+    ) == {
+        (1, 3): 5,
+        (2, 3): 0,
+    }
+    assert "1 line(s) or point(s) are in several regions 'reference' and kept in one only" in caplog.text
+
+
 def test_references_of_medit_at_other_vertices_are_point_data(tmp_path):
     mesh = read(tmp_path, "a.mesh", MEDIT.replace("1 1 0 0\n", "1 1 0 3\n"))
     assert mesh.point_data["reference"].tolist() == [4, 0, 0, 3]
