@@ -56,6 +56,19 @@ def unit_vectors(*shape: int) -> np.ndarray:
     return vectors / np.linalg.norm(vectors, axis=-1, keepdims=True)
 
 
+def marked(*, named: bool) -> Mesh:
+    """Return a mesh with regions of its feature edges, and of its fixed points if they have names."""
+    features, fixed = SURFACE.edges[::7], np.arange(0, N_POINTS, 5) if named else np.zeros(0, dtype=np.int64)
+    names = {3: "inlet", 5: "outer rim"} if named else {}
+    return Mesh(
+        surface=SURFACE,
+        features=features,
+        fixed_points=fixed,
+        feature_regions={"physical": Regions(np.arange(len(features)) % 3 + 3, names)},
+        fixed_point_regions={"physical": Regions(np.arange(len(fixed)) % 4 + 2, names)} if named else {},
+    )
+
+
 MESHES = {
     "numbers at points": point("height", RNG.normal(size=N_POINTS)),
     "vectors at points": point("velocity", RNG.normal(size=(N_POINTS, 3))),
@@ -78,7 +91,29 @@ MESHES = {
     ),
     "feature edges": Mesh(surface=SURFACE, features=SURFACE.edges[::7]),
     "fixed points": Mesh(surface=SURFACE, fixed_points=np.arange(0, N_POINTS, 5)),
+    "regions of feature edges": marked(named=False),
+    "regions of feature edges and fixed points with names": marked(named=True),
 }
+
+
+def marked_regions(mesh: Mesh) -> list[dict[bytes, tuple[int, str]]]:
+    """Return labels and names by place of the features of a mesh, and of its fixed points, that are in a region."""
+    result = []
+    for rows, divisions in ((mesh.features, mesh.feature_regions), (mesh.fixed_points, mesh.fixed_point_regions)):
+        found = {}
+        for division in divisions.values():
+            for row, label in zip(rows, division.labels.tolist(), strict=True):
+                if label:
+                    found[place(mesh, row)] = (label, division.names.get(label, ""))
+        result.append(found)
+    return result
+
+
+def marked_kept(mesh: Mesh, read: Mesh) -> str:
+    """Return how well the regions of features and fixed points were kept, whatever their divisions are called."""
+    given, found = marked_regions(mesh), marked_regions(read)
+    numbers = [[{key: label for key, (label, _) in part.items()} for part in both] for both in (given, found)]
+    return EXACT if given == found else "numbers" if numbers[0] == numbers[1] else LOST
 
 
 def by_corner(mesh: Mesh) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
@@ -141,12 +176,19 @@ def regions_kept(mesh: Mesh, read: Mesh) -> str:
 
 def places(mesh: Mesh, points: np.ndarray) -> set[bytes]:
     """Return the coordinates of points or edges."""
-    rows = [mesh.surface.points.astype(np.float32)[row].reshape(-1, 3) for row in points]
-    return {row[np.lexsort(row.T)].tobytes() for row in rows}
+    return {place(mesh, row) for row in points}
+
+
+def place(mesh: Mesh, row: np.ndarray) -> bytes:
+    """Return the coordinates of a point or an edge."""
+    found = mesh.surface.points.astype(np.float32)[row].reshape(-1, 3)
+    return found[np.lexsort(found.T)].tobytes()
 
 
 def kept(mesh: Mesh, read: Mesh) -> str:
     """Return how well a file has kept everything that a mesh carries."""
+    if mesh.feature_regions:
+        return marked_kept(mesh, read)
     results = []
     for data in (mesh.point_data, mesh.face_data, mesh.corner_data):
         results += [values_kept(values_at_corners(mesh, name), values_at_corners(read, name)) for name in data]

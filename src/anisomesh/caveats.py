@@ -108,6 +108,7 @@ def losses_of_attributes(before: Mesh, after: Mesh) -> Iterator[str]:
         names = ", ".join(moved)
         yield f"point data with different values at coincident points are corner data of the result: {names}"
     yield from _shrunk_regions(before, after)
+    yield from _lost_curves(before, after)
     used = before.fixed_points[np.isin(before.fixed_points, before.surface.faces)]
     unused = len(np.unique(before.fixed_points)) - len(np.unique(used))
     if unused:
@@ -135,6 +136,18 @@ def _shrunk_regions(before: Mesh, after: Mesh) -> Iterator[str]:
     if lost:
         more = f" and {len(lost) - _MAX_NAMED:,} more" if len(lost) > _MAX_NAMED else ""
         yield f"regions have lost area: {', '.join(lost[:_MAX_NAMED])}{more}; ask for more vertices"
+
+
+def _lost_curves(before: Mesh, after: Mesh) -> Iterator[str]:
+    """Yield a sentence if no edge of the result is in a region of prescribed edges."""
+    lost = []
+    for division, regions in before.feature_regions.items():
+        found = after.feature_regions.get(division)
+        gone = np.setdiff1d(regions.labels, 0 if found is None else np.append(found.labels, 0))
+        lost += [regions.names.get(label, f"{division} {label}") for label in gone.tolist()]
+    if lost:
+        more = f" and {len(lost) - _MAX_NAMED:,} more" if len(lost) > _MAX_NAMED else ""
+        yield f"no edges follow the lines {', '.join(lost[:_MAX_NAMED])}{more}; ask for more vertices"
 
 
 def caveats(

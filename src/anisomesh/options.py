@@ -116,7 +116,8 @@ class RemeshOptions:
         faces (F,).
     regions
         Whether edges of the result follow the borders between regions of a :class:`~anisomesh.attributes.model.Mesh`
-        and the seams of its corner data, also where the surface is smooth.
+        and the seams of its corner data, also where the surface is smooth, and has vertices at the ends of regions of
+        its features.
     attributes
         Whether the result has everything that a :class:`~anisomesh.attributes.model.Mesh` carries. If not, the mesh
         is taken for a mere surface, but for its features and fixed points.

@@ -88,6 +88,8 @@ def test_what_the_file_carries_is_listed(run_cli, facts, tmp_path):
         regions={"physical": anisomesh.Regions(side + 1, {2: "inlet"})},
         features=line,
         fixed_points=[0, 3],
+        feature_regions={"physical": anisomesh.Regions(np.arange(len(line)), {1: "rim"})},
+        fixed_point_regions={"physical": anisomesh.Regions(np.array([0, 8]), {8: "probe"})},
     )
     anisomesh.save(mesh, tmp_path / "in.vtu")
     found = facts(tmp_path / "in.vtu")
@@ -97,6 +99,8 @@ def test_what_the_file_carries_is_listed(run_cli, facts, tmp_path):
     assert found["point_data"]["velocity"] == {"type": "float64", "components": 3}
     assert found["prescribed_edges"] == {"count": len(line), "length": pytest.approx(1.0)}
     assert (found["fixed_points"], found["unit"]) == (2, None)
+    assert found["edge_regions"] == {"physical": [{"label": 1, "name": "rim", "edges": 1}]}
+    assert found["point_regions"] == {"physical": [{"label": 8, "name": "probe", "points": 1}]}
     text = run_cli("info", tmp_path / "in.vtu").stdout
     for words in (
         "physical: 3 (1, inlet = 2, 3)",
@@ -104,6 +108,8 @@ def test_what_the_file_carries_is_listed(run_cli, facts, tmp_path):
         "count (int32)",
         f"{len(line)} edges of length 1",
         "2 points",
+        "physical: 1 (rim)",
+        "physical: 1 (probe)",
     ):
         assert words in text
 

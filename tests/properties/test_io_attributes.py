@@ -98,14 +98,24 @@ def meshes(draw):
     labels = rng.integers(0, draw(st.integers(1, 5)), surface.n_faces) + draw(st.sampled_from([-3, 0, 1, 2**31 - 6]))
     names = draw(st.dictionaries(st.sampled_from(np.unique(labels).tolist()), NAME))
     used = np.unique(surface.faces)
+    features, fixed_points = surface.edges[rng.random(len(surface.edges)) < 0.3], used[rng.random(len(used)) < 0.5][:-1]
+
+    def marked(count):
+        own = rng.integers(0, draw(st.integers(1, 5)), count) * draw(st.sampled_from([1, 7, 2**29 - 1]))
+        present = np.unique(own[own != 0]).tolist()
+        given_names = draw(st.dictionaries(st.sampled_from(present), NAME)) if present else {}
+        return {"physical": Regions(own, given_names)} if present and draw(st.booleans()) else {}
+
     return Mesh(
         surface=surface,
         point_data=arrays(surface.n_points),
         face_data=arrays(surface.n_faces),
         corner_data={**arrays(surface.n_faces, 3), "uv": rng.uniform(size=(surface.n_faces, 3, 2))},
         regions={"physical": Regions(labels, names)} if draw(st.booleans()) else {},
-        features=surface.edges[rng.random(len(surface.edges)) < 0.3],
-        fixed_points=used[rng.random(len(used)) < 0.5][:-1],
+        features=features,
+        fixed_points=fixed_points,
+        feature_regions=marked(len(features)),
+        fixed_point_regions=marked(len(fixed_points)),
     )
 
 
@@ -139,6 +149,13 @@ def test_random_meshes(suffix, mesh):
         }
     if "fixed_points" in kinds:
         assert read.fixed_points.tolist() == mesh.fixed_points.tolist()
+    if suffix in (".msh", ".mesh", ".vtu", ".vtp"):
+        division = "reference" if suffix == ".mesh" else "physical"
+        for of in ("feature_regions", "fixed_point_regions"):
+            assert getattr(read, of).keys() == ({division} if getattr(mesh, of) else set())
+            for given_ in getattr(mesh, of).values():
+                np.testing.assert_array_equal(getattr(read, of)[division].labels, given_.labels)
+                assert suffix == ".mesh" or getattr(read, of)[division].names == given_.names
 
 
 NAMES_ONLY = (".obj", ".stl", ".glb", ".3mf")

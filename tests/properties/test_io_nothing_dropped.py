@@ -68,6 +68,22 @@ def divisions():
     yield "same", Regions(labels, {0: "a", 1: "a"})
 
 
+EDGES, FIXED = SURFACE.edges[::4], np.arange(0, V[0], 3)
+
+
+def marked_divisions():
+    """Return meshes with divisions of features and of fixed points, some of which are in no region."""
+    for name, regions in divisions():
+        names = {label + (label >= 0): text for label, text in regions.names.items()}
+        for field, rows in (("features", EDGES), ("fixed_points", FIXED)):
+            labels = np.resize(np.unique(regions.labels), len(rows))
+            labels = labels + (labels >= 0)
+            labels[::5] = 0
+            what = "features" if field == "features" else "fixed points"
+            given = {field: rows, f"{field.removesuffix('s')}_regions": {name: Regions(labels, names)}}
+            yield f"regions of {what} {name!r}", Mesh(surface=SURFACE, **given)
+
+
 MATERIALS = {
     "own": object(),
     "trimesh": "not a table of materials",
@@ -88,6 +104,7 @@ CASES = [
     *((f"materials {n!r}", Mesh(surface=SURFACE, regions=TWO, materials={n: v})) for n, v in MATERIALS.items()),
     ("feature edge", Mesh(surface=SURFACE, features=SURFACE.edges[::7])),
     ("fixed point", Mesh(surface=SURFACE, fixed_points=np.arange(0, V[0], 5))),
+    *marked_divisions(),
 ]
 
 
@@ -98,6 +115,12 @@ def is_kept(mesh, read):
         return False
     if not mesh.materials.keys() <= read.materials.keys():
         return False
+    for field in ("features", "fixed_points"):
+        kind = f"{field.removesuffix('s')}_regions"
+        given = [labelled(mesh, getattr(mesh, field), regions) for regions in getattr(mesh, kind).values()]
+        found = [labelled(read, getattr(read, field), regions) for regions in getattr(read, kind).values()]
+        if not all(any(same_labels(one, other) for other in found) for one in given):
+            return False
     divisions = read.regions.values()
     return all(any(same_regions(mesh, given, read, found) for found in divisions) for given in mesh.regions.values())
 
@@ -136,6 +159,22 @@ def same_regions(mesh, given, read, found):
     texts = [(plain(given.names.get(a, "")), plain(found.names.get(b, ""))) for a, b in pairs]
     one_to_one = len(pairs) == len(np.unique(labels[0])) == len(np.unique(labels[1]))
     return one_to_one and all(text in (name, name.rpartition("_")[0]) for text, name in texts if text)
+
+
+def labelled(mesh, rows, regions):
+    """Return label and name by place of features or fixed points that are in a region."""
+    found = {}
+    for row, label in zip(rows, regions.labels.tolist(), strict=True):
+        if label:
+            found[formats.place(mesh, row)] = label, plain(regions.names.get(label, ""))
+    return found
+
+
+def same_labels(given, found):
+    """Return whether the same places have the same labels, and names if they have any."""
+    return given.keys() == found.keys() and all(
+        label == found[key][0] and text in ("", found[key][1]) for key, (label, text) in given.items()
+    )
 
 
 def plain(text):

@@ -26,6 +26,8 @@ BOX = box((1.0, 1.0, 1.0), n=2)
         ({"regions": {"r": np.zeros(48, dtype=int)}}, r"regions\['r'\] is of type ndarray; expected Regions"),
         ({"features": [[0, 1, 2]]}, r"features has shape \(1, 3\); expected \(n, 2\)"),
         ({"features": [[0, 99]]}, r"features has the point 99; expected 0 to 25"),
+        ({"feature_regions": {"r": Regions(np.ones(1, dtype=int))}}, r"labels has shape \(1,\); expected \(0,\)"),
+        ({"fixed_point_regions": {"r": [1]}}, r"fixed_point_regions\['r'\] is of type list; expected Regions"),
         ({"fixed_points": [-1]}, r"fixed_points has the point -1"),
         ({"fixed_points": [0.5]}, r"fixed_points have dtype float64; expected integers"),
         (

@@ -90,6 +90,16 @@ def test_other_files_are_refused_with_the_line(tmp_path, text):
         load_pairs(tmp_path / "none.txt")
 
 
+def test_the_boundary_of_a_mesh_follows_tagged_edges_on_the_boundary():
+    surface, coarse = grid(8), grid(4)
+    none = np.zeros((0, 2), dtype=np.int64)
+    on_boundary = surface.edge_face_count == 1
+    assert distance_to_crease_edges(surface, on_boundary, coarse, none) < 1e-12
+    shifted = coarse.with_points(coarse.points + np.array([0.0, 0.0, 0.25]))
+    assert distance_to_crease_edges(surface, on_boundary, shifted, none) == pytest.approx(0.25)
+    assert distance_to_crease_edges(surface, np.ones_like(on_boundary), coarse, none) == np.inf
+
+
 def test_distance_to_crease_edges_is_the_largest_one():
     surface, coarse = grid(8), grid(4)
     tagged = tagged_edges(surface, np.concatenate([row(surface), row(surface, 0.5)]), surface, 0.0)

@@ -121,12 +121,35 @@ MEDIT = (
 def test_medit(tmp_path, caplog):
     mesh = read(tmp_path, "a.mesh", MEDIT)
     assert mesh.regions["reference"].labels.tolist() == [7, -2]
-    assert mesh.point_data["reference"].tolist() == [4, 0, 0, 0]
+    assert mesh.fixed_point_regions["reference"].labels.tolist() == [4, 0, 0]
+    assert dict(zip(map(tuple, mesh.features.tolist()), mesh.feature_regions["reference"].labels, strict=True)) == {
+        (0, 1): 0,
+        (1, 3): 5,
+        (3, 2): 0,
+    }
+    assert list(mesh.point_data) == ["normal"]
     np.testing.assert_array_equal(mesh.point_data["normal"], [[0, 0, 1]] * 2 + [[0, 0, 0]] * 2)
     assert rows(mesh.features) == {(0, 1), (1, 3), (2, 3)}
     assert mesh.fixed_points.tolist() == [0, 1, 2]
-    assert "left out the references of edges" in caplog.text
     assert "left out its sections Tangents" in caplog.text
+
+
+def test_an_edge_in_two_regions_keeps_the_first_that_it_has(tmp_path, caplog):
+    edges = "Edges\n5\n4 2 0\n2 4 5\n4 2 6\n4 3 0\n3 1 0\nRidges\n1\n1\nRequiredEdges\n1\n4\n"
+    mesh = read(tmp_path, "a.mesh", MEDIT[: MEDIT.index("Edges")] + edges + MEDIT[MEDIT.index("Corners") :])
+    assert dict(
+        zip(map(tuple, np.sort(mesh.features).tolist()), mesh.feature_regions["reference"].labels, strict=True)
+    ) == {
+        (1, 3): 5,
+        (2, 3): 0,
+    }
+    assert "1 line(s) or point(s) are in several regions 'reference' and kept in one only" in caplog.text
+
+
+def test_references_of_medit_at_other_vertices_are_point_data(tmp_path):
+    mesh = read(tmp_path, "a.mesh", MEDIT.replace("1 1 0 0\n", "1 1 0 3\n"))
+    assert mesh.point_data["reference"].tolist() == [4, 0, 0, 3]
+    assert not mesh.fixed_point_regions
 
 
 GMSH_41 = """$MeshFormat
@@ -216,12 +239,14 @@ def test_gmsh(tmp_path, caplog):
     assert mesh.regions["geometrical"].labels.tolist() == [4, 9]
     assert rows(mesh.features) == {(0, 1)}
     assert mesh.fixed_points.tolist() == [1]
+    assert mesh.feature_regions["physical"].labels.tolist() == [3]
+    assert mesh.feature_regions["physical"].names == {3: "rim"}
+    assert mesh.fixed_point_regions["physical"].labels.tolist() == [2]
     np.testing.assert_array_equal(mesh.point_data["height"], [10, 20, np.nan, 40])
     np.testing.assert_array_equal(mesh.face_data["flow"], [[1, 2, 3], [4, 5, 6]])
     said = [record.getMessage().partition(": ")[2] for record in caplog.records]
     assert said == [
         "1 surface(s) are in several physical groups and kept in the first only",
-        "left out physical groups of lines and points, whose edges and points are kept: rim",
         "left out its ElementNodeData",
         "left out a further time step of the data 'flow'",
     ]

@@ -26,6 +26,8 @@ FULL = Mesh(
     regions={"physical": Regions(LABELS, {1: "inlet", 2: "Wände"})},
     features=SURFACE.edges[::5].astype(np.int64),
     fixed_points=np.array([1, 4]),
+    feature_regions={"physical": Regions(np.arange(len(SURFACE.edges[::5])) % 3, {1: "rim"})},
+    fixed_point_regions={"physical": Regions(np.array([0, 7]), {7: "probe"})},
 )
 
 
@@ -44,6 +46,11 @@ def assert_same(mesh, expected, *left_out):
         rows = [set(map(tuple, np.sort(m.features).tolist())) for m in (mesh, expected)]
         assert rows[0] == rows[1]
         assert mesh.fixed_points.tolist() == expected.fixed_points.tolist()
+        for kind in ("feature_regions", "fixed_point_regions"):
+            assert getattr(mesh, kind).keys() == getattr(expected, kind).keys()
+            for name, wanted in getattr(expected, kind).items():
+                np.testing.assert_array_equal(getattr(mesh, kind)[name].labels, wanted.labels)
+                assert getattr(mesh, kind)[name].names == wanted.names
 
 
 def test_pyvista_and_back(caplog):
@@ -60,11 +67,14 @@ def test_meshio_and_back(caplog):
     data = to_meshio(FULL)
     assert caplog.messages == ["left out what meshio cannot hold: corner data 'uv'"]
     assert data.field_data["inlet"].tolist() == [1, 2]
+    assert data.field_data["rim"].tolist() == [1, 1]
+    assert data.field_data["probe"].tolist() == [7, 0]
     assert_same(mesh_of(data), FULL, "uv")
 
 
 def test_trimesh_and_back(caplog):
-    mesh = replace(FULL, regions={}, features=FULL.features[:0], fixed_points=FULL.fixed_points[:0])
+    bare = {"regions": {}, "feature_regions": {}, "fixed_point_regions": {}}
+    mesh = replace(FULL, **bare, features=FULL.features[:0], fixed_points=FULL.fixed_points[:0])
     data = to_trimesh(mesh)
     read = mesh_of(data)
     assert caplog.text == ""

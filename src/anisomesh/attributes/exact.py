@@ -43,10 +43,11 @@ def with_first_rows(target: Mesh, source: Mesh, points: Ints, faces: Ints, dista
         return np.asarray(table[joints.place[places]])
 
     known = edge_keys(target.surface.edges)
-    features = number(source.features)
-    features = features[(features >= 0).all(axis=1)]
-    features = np.concatenate([target.features, features[np.isin(edge_keys(features), known)]])
-    features = features[np.unique(edge_keys(features), return_index=True)[1]]
+    own_features = number(source.features)
+    kept = np.flatnonzero((own_features >= 0).all(axis=1))
+    kept = kept[np.isin(edge_keys(own_features[kept]), known)]
+    features = np.concatenate([target.features, own_features[kept]])
+    once = np.unique(edge_keys(features), return_index=True)[1]
     return replace(
         target,
         point_data={k: merged(v, source.point_data[k][points]) for k, v in target.point_data.items()},
@@ -57,5 +58,9 @@ def with_first_rows(target: Mesh, source: Mesh, points: Ints, faces: Ints, dista
         regions={
             k: Regions(merged(v.labels, source.regions[k].labels[faces]), v.names) for k, v in target.regions.items()
         },
-        features=features,
+        features=features[once],
+        feature_regions={
+            k: Regions(np.concatenate([v.labels, source.feature_regions[k].labels[kept]])[once], v.names)
+            for k, v in target.feature_regions.items()
+        },
     )

@@ -17,11 +17,12 @@ _MAX_MIDDLE_DISTANCE = 0.1  # the same of its middle: chords of curved lines; he
 _MIN_LINE_COSINE = 0.7  # between an edge and the line at its middle; heuristic
 
 
-def transfer_lines(lines: Floats, target: Surface) -> EdgeEnds:
-    """Return the edges (m, 2) of a surface that follow line segments (n, 2, 3)."""
-    lines = lines[(lines[:, 0] != lines[:, 1]).any(axis=1)]
+def transfer_lines(lines: Floats, target: Surface) -> tuple[EdgeEnds, Ints]:
+    """Return the edges (m, 2) of a surface that follow line segments (n, 2, 3), and the segment (m,) of each."""
+    proper = np.flatnonzero((lines[:, 0] != lines[:, 1]).any(axis=1))
+    lines = lines[proper]
     if len(lines) == 0:
-        return np.zeros((0, 2), dtype=np.int64)
+        return np.zeros((0, 2), dtype=np.int64), np.zeros(0, dtype=np.int64)
     ends = target.points[target.edges]
     limit = target.edge_lengths
     near = np.flatnonzero(
@@ -31,21 +32,27 @@ def transfer_lines(lines: Floats, target: Surface) -> EdgeEnds:
     distance, line = _distances(ends[near].mean(axis=1), lines)
     along = unit(ends[near, 1] - ends[near, 0]), unit(lines[line, 1] - lines[line, 0])
     follows = np.abs(np.einsum("nx,nx->n", *along)) >= _MIN_LINE_COSINE
-    chosen = near[follows & (distance <= _MAX_MIDDLE_DISTANCE * limit[near])]
-    return np.asarray(target.edges[chosen], dtype=np.int64)
+    follows &= distance <= _MAX_MIDDLE_DISTANCE * limit[near]
+    return np.asarray(target.edges[near[follows]], dtype=np.int64), proper[line[follows]]
 
 
-def transfer_fixed_points(places: Points, target: Surface) -> Ints:
-    """Return the points (m,) of a surface that are at places (n, 3), to a hundredth of the shortest edge there."""
+def transfer_fixed_points(places: Points, target: Surface) -> tuple[Ints, Ints]:
+    """Return the points (m,) of a surface that are at places (n, 3), and the place (m,) that each is at.
+
+    They are as near as a hundredth of the shortest edge there.
+    """
     if len(places) == 0:
-        return np.zeros(0, dtype=np.int64)
+        return np.zeros(0, dtype=np.int64), np.zeros(0, dtype=np.int64)
     shortest = np.full(target.n_points, np.inf)
     for end in target.edges.T:
         np.minimum.at(shortest, end, target.edge_lengths)
     used = np.unique(target.faces)
     distance, nearest = cKDTree(target.points[used]).query(places)
     point = used[nearest]
-    return np.unique(point[distance <= _MAX_END_DISTANCE * shortest[point]]).astype(np.int64)
+    found = np.flatnonzero(distance <= _MAX_END_DISTANCE * shortest[point])
+    found = found[np.argsort(distance[found], kind="stable")]
+    points, first = np.unique(point[found], return_index=True)
+    return points.astype(np.int64), found[first]
 
 
 def _distances(points: Points, lines: Floats) -> tuple[Floats, Ints]:

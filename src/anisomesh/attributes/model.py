@@ -22,12 +22,12 @@ Ints = npt.NDArray[np.int64]
 
 @dataclass(frozen=True, eq=False)
 class Regions:
-    """A division of the faces of a surface into regions.
+    """A division of the faces of a surface into regions, or of prescribed edges or fixed points.
 
     Attributes
     ----------
     labels
-        Label of the region of each face (F,), any integers.
+        Label of the region of each face (F,), any integers; of edges or points (n,), with 0 for none.
     names
         Names of labels, for the ones that have one.
     """
@@ -60,6 +60,9 @@ class Mesh:
         Edges that stay edges, as pairs of points (n, 2).
     fixed_points
         Points at which there stays a point (n,).
+    feature_regions, fixed_point_regions
+        Divisions of the features, and of the fixed points, by name: the physical curves and points of Gmsh, the
+        references of edges in MEDIT. The label of edges and points in no region is 0.
     materials
         Anything that belongs to the mesh as a whole or to regions, by name. It is handed on as it is.
 
@@ -80,6 +83,8 @@ class Mesh:
     regions: Mapping[str, Regions] = field(default_factory=dict)
     features: EdgeEnds = field(default_factory=lambda: np.zeros((0, 2), dtype=np.int64))
     fixed_points: Ints = field(default_factory=lambda: np.zeros(0, dtype=np.int64))
+    feature_regions: Mapping[str, Regions] = field(default_factory=dict)
+    fixed_point_regions: Mapping[str, Regions] = field(default_factory=dict)
     materials: Mapping[str, Any] = field(default_factory=dict)
 
     def __post_init__(self) -> None:
@@ -93,16 +98,16 @@ class Mesh:
         both = sorted(set(self.point_data) & set(self.corner_data))
         if both:
             raise MeshError(f"{both[0]!r} is in point_data and in corner_data; give them different names")
-        for name, regions in self._mapping("regions").items():
-            if not isinstance(regions, Regions):
-                raise MeshError(
-                    f"regions[{name!r}] is of type {type(regions).__name__}; expected Regions(labels, names)"
-                )
-            _checked(f"regions[{name!r}].labels", regions.labels, (n_faces,))
-        object.__setattr__(self, "regions", dict(self.regions))
         object.__setattr__(self, "materials", self._mapping("materials"))
         object.__setattr__(self, "features", _points_of("features", self.features, n_points, 2))
         object.__setattr__(self, "fixed_points", _points_of("fixed_points", self.fixed_points, n_points, 1))
+        counts = {
+            "regions": n_faces,
+            "feature_regions": len(self.features),
+            "fixed_point_regions": len(self.fixed_points),
+        }
+        for what, count in counts.items():
+            object.__setattr__(self, what, self._divisions(what, count))
 
     def _mapping(self, what: str) -> dict[str, Any]:
         """Return a field by name, or an error unless it is a mapping with names for keys."""
@@ -113,6 +118,21 @@ class Mesh:
         if wrong:
             raise MeshError(f"{what} has the name {wrong[0]!r} of type {type(wrong[0]).__name__}; expected a string")
         return dict(given)
+
+    def _divisions(self, what: str, count: int) -> dict[str, Regions]:
+        """Return divisions by name, or an error unless they are divisions of a number of faces, edges or points."""
+        given = self._mapping(what)
+        for name, regions in given.items():
+            if not isinstance(regions, Regions):
+                kind = type(regions).__name__
+                raise MeshError(f"{what}[{name!r}] is of type {kind}; expected Regions(labels, names)")
+            if regions.labels.shape != (count,):
+                row = {"regions": "face of the surface", "feature_regions": "feature"}.get(what, "fixed point")
+                raise MeshError(
+                    f"{what}[{name!r}].labels has shape {regions.labels.shape}; expected ({count},), a label for each "
+                    f"{row}"
+                )
+        return given
 
     def __repr__(self) -> str:
         names = {f.name: len(getattr(self, f.name)) for f in fields(self) if f.name != "surface"}

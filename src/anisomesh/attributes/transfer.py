@@ -51,7 +51,7 @@ def transfer_attributes(source: Mesh, target: Surface) -> Mesh:
       places of its corners are reached by straight walks from one of these within the chart: no value beyond a seam
       has a part in it.
     - *Features* are the edges of the target along the ones of the source, *fixed points* the points of the target at
-      the ones of the source.
+      the ones of the source; they are in the regions of the closest of these.
     """
     if not isinstance(source, Mesh) or not isinstance(target, Surface):
         raise MeshError(f"expected a Mesh and a Surface, not {type(source).__name__} and {type(target).__name__}")
@@ -60,6 +60,8 @@ def transfer_attributes(source: Mesh, target: Surface) -> Mesh:
         return replace(source, surface=target)
     source = _in_order(with_seams_at_corners(source, Joints(own)))
     located = Located(source, target)
+    features, line = transfer_lines(own.points[source.features], target)
+    fixed_points, place = transfer_fixed_points(own.points[source.fixed_points], target)
     return Mesh(
         surface=target,
         point_data=_point_data(located) if source.point_data else {},
@@ -69,8 +71,10 @@ def transfer_attributes(source: Mesh, target: Surface) -> Mesh:
             name: Regions(source.part_labels[name][located.parts], regions.names)
             for name, regions in source.regions.items()
         },
-        features=transfer_lines(own.points[source.features], target),
-        fixed_points=transfer_fixed_points(own.points[source.fixed_points], target),
+        features=features,
+        fixed_points=fixed_points,
+        feature_regions={name: Regions(d.labels[line], d.names) for name, d in source.feature_regions.items()},
+        fixed_point_regions={name: Regions(d.labels[place], d.names) for name, d in source.fixed_point_regions.items()},
         materials=source.materials,
     )
 

@@ -33,7 +33,9 @@ def contents(mesh: Mesh, suffix: str) -> dict[str, Any]:
             "count": len(mesh.features),
             "length": float(np.linalg.norm(ends[:, 1] - ends[:, 0], axis=1).sum()),
         },
+        "edge_regions": _marked(mesh.feature_regions, "edges"),
         "fixed_points": len(mesh.fixed_points),
+        "point_regions": _marked(mesh.fixed_point_regions, "points"),
         "materials": sorted(mesh.materials),
     }
 
@@ -48,6 +50,17 @@ def _regions(regions: Regions, areas: Array) -> list[dict[str, Any]]:
     ]
 
 
+def _marked(divisions: Mapping[str, Regions], what: str) -> dict[str, list[dict[str, Any]]]:
+    """Return label, name and number of edges or points of each region of divisions, without the ones in no region."""
+    return {
+        name: [
+            {"label": label, "name": regions.names.get(label), what: int(np.count_nonzero(regions.labels == label))}
+            for label in np.unique(regions.labels[regions.labels != 0]).tolist()
+        ]
+        for name, regions in divisions.items()
+    }
+
+
 def _arrays(data: Mapping[str, Array], n_leading: int) -> dict[str, dict[str, Any]]:
     """Return the type and the components of arrays, with so many dimensions in front of them."""
     return {
@@ -59,23 +72,32 @@ def _arrays(data: Mapping[str, Array], n_leading: int) -> dict[str, dict[str, An
 def contents_rows(facts: dict[str, Any]) -> list[tuple[str, str]]:
     """Return the lines of text for :func:`contents`, of what there is."""
     rows = [("unit", facts["unit"])] if facts["unit"] else []
-    for name, regions in facts["regions"].items():
-        texts = [
-            f"{region['name']} = {region['label']}" if region["name"] else str(region["label"]) for region in regions
-        ]
-        more = f" and {len(texts) - _MAX_NAMED:,} more" if len(texts) > _MAX_NAMED else ""
-        rows.append(("regions", f"{name}: {len(texts):,} ({', '.join(texts[:_MAX_NAMED])}{more})"))
+    rows += _region_rows("regions", facts["regions"])
     for kind, title in _DATA_TITLES.items():
         if facts[kind]:
             rows.append((title, ", ".join(_array_text(name, facts[kind][name]) for name in facts[kind])))
     edges = facts["prescribed_edges"]
     if edges["count"]:
         rows.append(("prescribed", f"{counted(edges['count'], 'edge')} of length {edges['length']:.6g}"))
+    rows += _region_rows("prescribed", facts["edge_regions"])
     if facts["fixed_points"]:
         rows.append(("fixed", counted(facts["fixed_points"], "point")))
+    rows += _region_rows("fixed", facts["point_regions"])
     others = [name for name in facts["materials"] if name != "unit"]
     if others:
         rows.append(("materials", ", ".join(others)))
+    return rows
+
+
+def _region_rows(title: str, divisions: dict[str, list[dict[str, Any]]]) -> list[tuple[str, str]]:
+    """Return a line for each division into regions, with the first names or labels."""
+    rows = []
+    for name, regions in divisions.items():
+        texts = [
+            f"{region['name']} = {region['label']}" if region["name"] else str(region["label"]) for region in regions
+        ]
+        more = f" and {len(texts) - _MAX_NAMED:,} more" if len(texts) > _MAX_NAMED else ""
+        rows.append((title, f"{name}: {len(texts):,} ({', '.join(texts[:_MAX_NAMED])}{more})"))
     return rows
 
 

@@ -127,7 +127,8 @@ def distance_to_crease_edges(
     surface
         The surface.
     tagged
-        Its tagged edges (E,), of which the ends and middles are measured.
+        Its tagged edges (E,), of which the ends and middles are measured: on the boundary to the boundary of the mesh,
+        elsewhere to its edges along creases.
     mesh
         A mesh near the surface, in the same units.
     crease_edges

@@ -7,7 +7,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from anisomesh.attributes.model import Mesh, Regions
-from anisomesh.io.carried import Array, Carried, Integers
+from anisomesh.io.carried import Array, Carried, Integers, Marked
 from anisomesh.io.polygons import PolygonSoup, as_triangles
 from anisomesh.mesh.surface import Surface
 from anisomesh.mesh.topology import edge_keys
@@ -49,12 +49,16 @@ def as_mesh(soup: PolygonSoup) -> tuple[Mesh, tuple[str, ...], tuple[str, ...]]:
             present = set(np.unique(labels[name]).tolist())
             names = {label: text for label, text in division.names.items() if label in present}
             regions[name] = Regions(labels[name].astype(np.int64), names)
+    features, feature_regions = _features(carried, surface)
+    fixed_points, fixed_point_regions = _fixed_points(carried, surface)
     mesh = Mesh(
         surface=surface,
         **rows,
         regions=regions,
-        features=_features(carried, surface),
-        fixed_points=_fixed_points(carried, surface),
+        features=features,
+        fixed_points=fixed_points,
+        feature_regions=feature_regions,
+        fixed_point_regions=fixed_point_regions,
         materials=carried.materials,
     )
     return mesh, triangles.remarks, tuple(dict.fromkeys(carried.remarks))
@@ -76,42 +80,102 @@ def _rows(carried: Carried, data: dict[str, Array], what: str, rows: Integers) -
     return chosen
 
 
-def _features(carried: Carried, surface: Surface) -> Integers:
-    """Return the lines that are edges of the surface (n, 2), without repetition, in order."""
-    straight, halves = _in_range(carried.lines, surface.n_points)
+def _features(carried: Carried, surface: Surface) -> tuple[Integers, dict[str, Regions]]:
+    """Return the lines that are edges of the surface (n, 2), without repetition, in order, and divisions of them."""
+    (straight, halves), (row, row_of_half) = _in_range(carried.lines.blocks, surface.n_points)
     both = np.concatenate([straight, halves])
     if len(both) == 0:
-        return both
+        return both, {}
     n_lines = len(straight)
     keys = edge_keys(np.sort(both, axis=1))
     are_edges = np.isin(keys, edge_keys(surface.edges))
     missing = n_lines - np.count_nonzero(are_edges[:n_lines])
     if missing and len(halves) == 0:
         carried.remarks.append(f"left out {missing} line(s) that are not edges of its surface")
-    chosen = np.flatnonzero(are_edges)
-    chosen = chosen[np.sort(np.unique(keys[chosen], return_index=True)[1])]
+    rows = np.concatenate([row, row_of_half])
+    chosen, divisions = _each_once(carried, carried.lines, keys, rows, np.flatnonzero(are_edges))
     features: Integers = both[chosen]
-    return features
+    return features, divisions
 
 
-def _in_range(lines: Sequence[Integers], n_points: int) -> tuple[Integers, Integers]:
-    """Return lines from end to end (n, 2), and the halves (m, 2) of the ones of second order, within the points."""
+def _in_range(lines: Sequence[Integers], n_points: int) -> tuple[tuple[Integers, Integers], tuple[Integers, Integers]]:
+    """Return lines from end to end (n, 2), and the halves (m, 2) of the ones of second order, within the points.
+
+    The second pair is the number (n,) and (m,) of the line that each is among all lines.
+    """
     straight, halves = [np.zeros((0, 2), dtype=np.int64)], [np.zeros((0, 2), dtype=np.int64)]
+    row, row_of_half, first = [np.zeros(0, dtype=np.int64)], [np.zeros(0, dtype=np.int64)], 0
     for block in lines:
-        inside = block[((block >= 0) & (block < n_points)).all(axis=1) & (block[:, 0] != block[:, 1])]
-        straight.append(inside[:, :2])
+        chosen = np.flatnonzero(((block >= 0) & (block < n_points)).all(axis=1) & (block[:, 0] != block[:, 1]))
+        straight.append(block[chosen, :2])
+        row.append(first + chosen)
         if block.shape[1] == 3:
-            halves += [inside[:, [0, 2]], inside[:, [2, 1]]]
-    return np.concatenate(straight), np.concatenate(halves)
+            halves += [block[chosen][:, [0, 2]], block[chosen][:, [2, 1]]]
+            row_of_half += [first + chosen] * 2
+        first += len(block)
+    return (np.concatenate(straight), np.concatenate(halves)), (np.concatenate(row), np.concatenate(row_of_half))
 
 
-def _fixed_points(carried: Carried, surface: Surface) -> Integers:
-    """Return the points (n,) that faces use, sorted; all points of a surface are fixed by mistake and not kept."""
-    given = np.unique(np.concatenate([np.zeros(0, dtype=np.int64), *carried.fixed_points]))
-    fixed: Integers = given[np.isin(given, surface.faces)]
-    if len(fixed) < len(given):
-        carried.remarks.append(f"left out {len(given) - len(fixed)} point(s) that no face uses as fixed points")
-    if len(fixed) and len(fixed) == len(np.unique(surface.faces)):
+def _fixed_points(carried: Carried, surface: Surface) -> tuple[Integers, dict[str, Regions]]:
+    """Return the points (n,) that faces use, sorted, and divisions of them.
+
+    All points of a surface are fixed by mistake and not kept.
+    """
+    marked = np.concatenate([np.zeros(0, dtype=np.int64), *carried.fixed_points.blocks])
+    used = np.isin(marked, surface.faces)
+    unused = len(np.unique(marked[~used]))
+    if unused:
+        carried.remarks.append(f"left out {unused} point(s) that no face uses as fixed points")
+    rows = np.flatnonzero(used)
+    if len(rows) and len(np.unique(marked[rows])) == len(np.unique(surface.faces)):
         carried.remarks.append("did not fix points since it lists every point of its surface")
-        return fixed[:0]
-    return fixed
+        return marked[:0], {}
+    rows = rows[np.argsort(marked[rows], kind="stable")]
+    chosen, divisions = _each_once(carried, carried.fixed_points, marked[rows], rows, np.arange(len(rows)))
+    fixed: Integers = marked[rows][chosen]
+    return fixed, divisions
+
+
+def _each_once(
+    carried: Carried, marked: Marked, keys: Integers, rows: Integers, chosen: Integers
+) -> tuple[Integers, dict[str, Regions]]:
+    """Choose among lines or points one for each key, one with a label if there is any.
+
+    Parameters
+    ----------
+    carried
+        Remarks are added here.
+    marked
+        All lines or points.
+    keys, rows
+        Key of each of these (n,), and its row (n,) in all blocks.
+    chosen
+        Which (m,) to choose from.
+
+    Returns
+    -------
+    chosen
+        The ones that are chosen (k,), in order.
+    divisions
+        Divisions of these by name.
+    """
+    labels: dict[str, Integers] = {}
+    for name in marked.divisions:
+        with carried.optional(f"regions {name!r} of lines or points"):
+            labels[name] = marked.labels(name)[rows]
+    bare = ~np.any([np.zeros(len(keys), dtype=bool), *(values != 0 for values in labels.values())], axis=0)
+    chosen = chosen[np.argsort(bare[chosen], kind="stable")]
+    once = np.sort(chosen[np.unique(keys[chosen], return_index=True)[1]])
+    divisions = {}
+    for name, values in labels.items():
+        given = chosen[values[chosen] != 0]
+        several = len(np.unique(np.stack([keys[given], values[given]]), axis=1).T) - len(np.unique(keys[given]))
+        if several:
+            carried.remarks.append(
+                f"{several} line(s) or point(s) are in several regions {name!r} and kept in one only"
+            )
+        present = set(values[once].tolist())
+        if present - {0}:
+            names = {label: text for label, text in marked.divisions[name].names.items() if label in present - {0}}
+            divisions[name] = Regions(values[once], names)
+    return once, divisions

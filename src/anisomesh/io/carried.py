@@ -5,7 +5,7 @@ from __future__ import annotations
 import lzma
 import re
 import zlib
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass, field
 from typing import Any
@@ -31,6 +31,7 @@ _BROKEN = (
 )  # what malformed data make readers raise
 _FEW_REGIONS = 8  # up to which integers with a telling name are regions in any case; heuristic
 _FACES_PER_REGION = 2  # at least, if there are more; heuristic
+_SURFACE = 2  # dimension
 _REGION = re.compile(
     r"(gmsh:)?(physical|geometrical)|medit:ref|reference|(domain|part|zone|block|region|material|group|object|solid)s?"
     r"|(cell_?entity|model_?face|domain|part|zone|block|region|material|group|object|face|boundary)_?(ids?|tags?|labels?)",
@@ -47,6 +48,44 @@ class Division:
 
 
 @dataclass(kw_only=True, eq=False)
+class Marked:
+    """Lines or points that a file marks, in blocks, with divisions of them into regions.
+
+    Attributes
+    ----------
+    blocks
+        Arrays of points, (n,) of points, (n, 2) of straight lines or (n, 3) of lines of second order with the node in
+        the middle last.
+    cells
+        For each block the numbers (n,) of the cells of the file, which the labels of divisions belong to, -1 for none.
+    divisions
+        Divisions by name, with a label for each cell.
+    """
+
+    blocks: list[Integers] = field(default_factory=list)
+    cells: list[Integers] = field(default_factory=list)
+    divisions: dict[str, Division] = field(default_factory=dict)
+
+    def add(self, block: Integers, cells: Integers | None = None) -> None:
+        """Add a block, with the numbers of its cells if they have labels."""
+        self.blocks.append(block)
+        self.cells.append(np.full(len(block), -1, dtype=np.int64) if cells is None else cells)
+
+    def divide(self, name: str, labels: Integers, names: dict[int, str] | None = None) -> None:
+        """Add a division by labels of all cells of the file, unless all lines or points have the label 0."""
+        used = np.concatenate([np.zeros(0, dtype=np.int64), *self.cells])
+        used = used[used >= 0]
+        if labels[used].any():
+            self.divisions[name] = Division(labels=labels.astype(np.int64), names=names or {})
+
+    def labels(self, name: str) -> Integers:
+        """Return the labels (n,) of a division of the rows of all blocks, 0 for none."""
+        cells = np.concatenate([np.zeros(0, dtype=np.int64), *self.cells])
+        labels: Integers = np.append(self.divisions[name].labels, 0)[cells]
+        return labels
+
+
+@dataclass(kw_only=True, eq=False)
 class Carried:
     """What a file carries besides points and polygons, not validated.
 
@@ -56,10 +95,8 @@ class Carried:
         Arrays by name, with a row for each point, each face or cell of the file, or each corner of the polygons.
     divisions
         Divisions of the faces or cells of the file by name.
-    lines
-        Arrays of points, (n, 2) of straight lines or (n, 3) of lines of second order with the node in the middle last.
-    fixed_points
-        Points (n,).
+    lines, fixed_points
+        Lines and points that a mesh is to keep.
     materials
         Whatever belongs to the file as a whole.
     remarks
@@ -70,8 +107,8 @@ class Carried:
     cell_data: dict[str, Array] = field(default_factory=dict)
     corner_data: dict[str, Array] = field(default_factory=dict)
     divisions: dict[str, Division] = field(default_factory=dict)
-    lines: list[Integers] = field(default_factory=list)
-    fixed_points: list[Integers] = field(default_factory=list)
+    lines: Marked = field(default_factory=Marked)
+    fixed_points: Marked = field(default_factory=Marked)
     materials: dict[str, Any] = field(default_factory=dict)
     remarks: list[str] = field(default_factory=list)
 
@@ -86,19 +123,41 @@ class Carried:
 
     def add_cell_data(self, name: str, values: Array, *, names: dict[int, str] | None = None) -> None:
         """Add cell data: a division if its labels have names or it is called as divisions usually are."""
-        is_label = values.ndim == 1 and values.dtype.kind in "iu"
-        most = max(_FEW_REGIONS, len(values) // _FACES_PER_REGION)
-        by_name = is_label and is_region(name) and len(np.unique(values)) <= most
-        if is_label and (names is not None or by_name):
+        if _is_division(name, values, names):
             self.divisions[name] = Division(labels=values.astype(np.int64), names=names or {})
         else:
             self.cell_data[name] = values
+
+    def add_data_of_all_cells(self, name: str, values: Array, names: Sequence[dict[int, str] | None]) -> None:
+        """Add data of cells among which are lines and fixed points, as data of faces and as divisions of each.
+
+        ``names`` are the ones of regions of points, lines and faces, None where none are given. What is a division of
+        points or lines, and 0 without a name elsewhere, is not added to the faces.
+        """
+        elsewhere = np.ones(len(values), dtype=bool)
+        found = False
+        for marked, own in zip((self.fixed_points, self.lines), names, strict=False):
+            cells = np.concatenate([np.zeros(0, dtype=np.int64), *marked.cells])
+            elsewhere[cells] = False
+            if _is_division(name, values[cells], own):
+                marked.divide(name, values, own)
+                found |= name in marked.divisions
+        if not found or values[elsewhere].any() or 0 in (names[_SURFACE] or {}):
+            self.add_cell_data(name, values, names=names[_SURFACE])
 
     def take_corners(self, rows: Array) -> None:
         """Take rows of the corner data, given by their numbers or a mask."""
         for name, values in list(self.corner_data.items()):
             with self.optional(f"corner data {name!r}"):
                 self.corner_data[name] = values[rows]
+
+
+def _is_division(name: str, labels: Array, names: dict[int, str] | None) -> bool:
+    """Return whether data are a division into regions: their labels have names, or they are called as usual."""
+    if labels.ndim != 1 or labels.dtype.kind not in "iu":
+        return False
+    most = max(_FEW_REGIONS, len(labels) // _FACES_PER_REGION)
+    return names is not None or (is_region(name) and len(np.unique(labels)) <= most)
 
 
 def is_region(name: str) -> bool:

@@ -14,6 +14,9 @@ from anisomesh.mesh.surface import Surface
 _PREFERRED = ("physical", "material", "group", "object", "solid", "node", "reference")  # divisions, if one is kept
 
 
+OF_FEATURES, OF_FIXED_POINTS = "regions of feature edges", "regions of fixed points"
+"""What a warning calls divisions of features and of fixed points."""
+
 _LARGEST_EXACT = 2**53  # up to it every integer has a float64
 
 
@@ -39,11 +42,17 @@ class Losses:
         self._changed.append(name)
 
     def features(self, mesh: Mesh) -> None:
-        """Add the features and fixed points of a mesh."""
+        """Add the features and fixed points of a mesh, and their divisions."""
         if len(mesh.features):
             self.say(f"{len(mesh.features)} feature edge(s)")
         if len(mesh.fixed_points):
             self.say(f"{len(mesh.fixed_points)} fixed point(s)")
+        self.divisions_of_features(mesh)
+
+    def divisions_of_features(self, mesh: Mesh) -> None:
+        """Add the divisions of the features and fixed points of a mesh."""
+        self.add(OF_FEATURES, *mesh.feature_regions)
+        self.add(OF_FIXED_POINTS, *mesh.fixed_point_regions)
 
     def names_of_regions(self, mesh: Mesh, *divisions: str) -> None:
         """Add the names of the regions of divisions that have names."""
@@ -89,6 +98,32 @@ def main_division(regions: Mapping[str, Regions], *preferred: str) -> tuple[str,
     """Return the division for a format that holds one: one of these names, else the most telling one."""
     wanted = (*preferred, *_PREFERRED, *sorted(regions))
     return next(((name, regions[name]) for name in wanted if name in regions), None)
+
+
+def held_division(
+    regions: Mapping[str, Regions], what: str, losses: Losses, *preferred: str, with_names: bool = False
+) -> Regions | None:
+    """Return the one division of features or fixed points that a format holds, if any has a label; others are lost.
+
+    Parameters
+    ----------
+    regions
+        All divisions.
+    what
+        :data:`OF_FEATURES` or :data:`OF_FIXED_POINTS`.
+    losses
+        What is lost is added here.
+    preferred
+        Names of divisions as for :func:`main_division`.
+    with_names
+        Whether the format holds names.
+    """
+    given = {name: division for name, division in regions.items() if division.labels.any()}
+    found = main_division(given, *preferred)
+    losses.add(what, *(name for name in given if found is None or name != found[0]))
+    if found is not None and found[1].names and not with_names:
+        losses.add(f"names of {what}", found[0])
+    return None if found is None else found[1]
 
 
 def by_label(*labels: Integers) -> list[tuple[tuple[int, ...], Integers]]:
@@ -161,9 +196,15 @@ def with_points_repeated(mesh: Mesh) -> tuple[Mesh, Integers]:
 
 def regions_as_integers(mesh: Mesh, divisions: Sequence[str]) -> dict[str, Integers]:
     """Return the labels of divisions in the smallest of int32 and int64 that holds them."""
-    labels = {name: mesh.regions[name].labels for name in divisions}
+    return {name: narrowed(mesh.regions[name].labels) for name in divisions}
+
+
+def narrowed(labels: Integers) -> Integers:
+    """Return labels (n,) in the smallest of int32 and int64 that holds them."""
+    return labels.astype(np.int32) if fits_int32(labels) else labels
+
+
+def fits_int32(labels: Integers) -> bool:
+    """Return whether int32 holds all labels (n,)."""
     limits = np.iinfo(np.int32)
-    return {
-        name: values.astype(np.int32) if values.min() >= limits.min and values.max() <= limits.max else values
-        for name, values in labels.items()
-    }
+    return len(labels) == 0 or bool(labels.min() >= limits.min and labels.max() <= limits.max)

@@ -16,6 +16,9 @@ from anisomesh.features.tagged import search_radius
 from anisomesh.options import RemeshOptions
 from anisomesh.repair.prepare import Prepared
 
+_FEW_ENDS = 64  # of regions of features that are fixed in any case; heuristic
+_MAX_END_SHARE = 0.5  # of the points on features, if there are more; heuristic
+
 
 def with_fixed_points(mesh: Mesh, prepared: Prepared, options: RemeshOptions) -> tuple[Prepared, PointMask]:
     """Return the prepared surface with fixed points and points to keep exactly where they were, and which these are.
@@ -27,10 +30,12 @@ def with_fixed_points(mesh: Mesh, prepared: Prepared, options: RemeshOptions) ->
 
     Notes
     -----
-    Repair merges and copies points, so they are found again by their positions, all copies of each.
+    Repair merges and copies points, so they are found again by their positions, all copies of each. Ends of regions of
+    features, such as physical curves, are fixed like the fixed points of the mesh, unless borders are not followed.
     """
     asked = checked_points("keep_points", options.keep_points, mesh.surface.n_points)
-    wanted = np.concatenate([asked, mesh.fixed_points])
+    ends = curve_ends(mesh) if options.attributes and options.regions else asked[:0]
+    wanted = np.concatenate([asked, mesh.fixed_points, ends])
     fixed = np.zeros(prepared.surface.n_points, dtype=bool)
     if len(wanted) == 0:
         return prepared, fixed
@@ -60,6 +65,26 @@ def with_fixed_points(mesh: Mesh, prepared: Prepared, options: RemeshOptions) ->
         return prepared, fixed
     points[fixed] = places[owner[fixed]]
     return replace(prepared, surface=prepared.surface.with_points(points)), fixed
+
+
+def curve_ends(mesh: Mesh) -> Ints:
+    """Return the points (n,) at which a region of the features of a mesh ends or branches.
+
+    There are none if regions end at most points on them, since their labels then number edges and not curves.
+    """
+    points = mesh.features.ravel()
+    place = np.unique(mesh.surface.points[points], axis=0, return_inverse=True)[1].reshape(-1)
+    is_end = np.zeros(len(points), dtype=bool)
+    for regions in mesh.feature_regions.values():
+        label = np.repeat(regions.labels, 2)
+        pairs, number, count = np.unique(
+            np.stack([place, label], axis=1), axis=0, return_inverse=True, return_counts=True
+        )
+        is_end |= ((count != 2) & (pairs[:, 1] != 0))[number.reshape(-1)]
+    ends, n_points = np.unique(place[is_end], return_index=True)[1], len(np.unique(place))
+    if len(ends) > max(_FEW_ENDS, _MAX_END_SHARE * n_points):
+        return points[:0]
+    return np.asarray(points[is_end][ends], dtype=np.int64)
 
 
 def checked_points(name: str, values: npt.ArrayLike | None, n_points: int) -> Ints:

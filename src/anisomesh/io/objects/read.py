@@ -29,7 +29,7 @@ _MESHIO_OTHER = re.compile(
     r"vertex|line\d*|tetra\d*|hexahedron\d*|wedge\d*|pyramid\d*|penta_prism|hexa_prism|polyhedron\d*"
     r"|VTK_LAGRANGE_(?:CURVE|TETRAHEDRON|HEXAHEDRON|WEDGE|PYRAMID)"
 )
-_SURFACE_DIMENSION = 2  # of physical groups
+_N_DIMENSIONS = 3  # of physical groups that are read: points, lines and faces
 
 
 def polygon_soup(mesh: Any) -> PolygonSoup | None:
@@ -116,13 +116,13 @@ def _from_meshio(mesh: Any) -> PolygonSoup:
             cells.add(cast(Shape, surface[1].lower()), np.asarray(block.data))
         elif _MESHIO_OTHER.fullmatch(block.type):
             cells.ignore(block.type, len(block.data))
-            cells.take_numbers(len(block.data))
+            numbers = cells.take_numbers(len(block.data))
         else:
             raise ValueError(f"it has cells of type {block.type!r}, which is not known; convert them to triangles")
         if block.type in ("line", "line3"):
-            carried.lines.append(np.asarray(block.data, dtype=np.int64))
+            carried.lines.add(np.asarray(block.data, dtype=np.int64), numbers)
         elif block.type == "vertex":
-            carried.fixed_points.append(np.asarray(block.data, dtype=np.int64).ravel())
+            carried.fixed_points.add(np.asarray(block.data, dtype=np.int64).ravel(), numbers)
     _carry_meshio(mesh, carried)
     points = np.asarray(mesh.points, dtype=np.float64)
     return cells.soup(np.pad(points, ((0, 0), (0, 3 - points.shape[1]))), carried=carried)
@@ -132,11 +132,11 @@ def _carry_meshio(mesh: Any, carried: Carried) -> None:
     """Add point and cell data, physical groups with their names, and sets of points and cells."""
     carried.point_data |= _arrays(mesh.point_data)
     groups = {name: np.ravel(value).tolist() for name, value in mesh.field_data.items()}
-    names = {value[0]: name for name, value in groups.items() if value[1:] == [_SURFACE_DIMENSION]}
+    names = [{value[0]: name for name, value in groups.items() if value[1:] == [d]} for d in range(_N_DIMENSIONS)]
     for name, blocks in mesh.cell_data.items():
         with carried.optional(f"cell data {name!r}"):
-            labelled = names if name == "gmsh:physical" else None
-            carried.add_cell_data(MESHIO_DIVISIONS.get(name, name), np.concatenate(blocks), names=labelled)
+            labelled = names if name == "gmsh:physical" else [None] * _N_DIMENSIONS
+            carried.add_data_of_all_cells(MESHIO_DIVISIONS.get(name, name), np.concatenate(blocks), labelled)
     for name, chosen in mesh.point_sets.items():
         with carried.optional(f"the set of points {name!r}"):
             is_in = np.zeros(len(mesh.points), dtype=bool)
@@ -148,6 +148,10 @@ def _carry_meshio(mesh: Any, carried: Carried) -> None:
         with carried.optional(f"the set of cells {name!r}"):
             rows = [np.asarray(rows, dtype=np.int64) + start for rows, start in zip(blocks, first, strict=False)]
             _add_set(carried, name, np.concatenate(rows), int(first[-1]))
+    for name, division in list(carried.divisions.items()):
+        if name.startswith(CELL_SET):
+            del carried.divisions[name]
+            carried.add_data_of_all_cells(name, division.labels, [division.names] * _N_DIMENSIONS)
 
 
 def _add_set(carried: Carried, name: str, chosen: Integers, n_cells: int) -> None:

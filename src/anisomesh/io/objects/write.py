@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import io
 import logging
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from importlib import import_module
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -14,10 +14,18 @@ from anisomesh.attributes.model import Mesh, Regions
 from anisomesh.io.carried import COLOUR, UV, Array, Integers
 from anisomesh.io.formats.gltf.read import MATERIAL, NODE
 from anisomesh.io.formats.gltf.write import glb_bytes
+from anisomesh.io.formats.gmsh.elements import PHYSICAL
 from anisomesh.io.formats.region_names import region_texts
 from anisomesh.io.formats.vtk.data import ORIGINAL_POINT
 from anisomesh.io.formats.vtk.write import active_names, vtk_polygons
-from anisomesh.io.holding import Losses, by_label, continuous_corner_data, with_points_repeated
+from anisomesh.io.holding import (
+    OF_FEATURES,
+    OF_FIXED_POINTS,
+    Losses,
+    by_label,
+    continuous_corner_data,
+    with_points_repeated,
+)
 from anisomesh.io.objects.read import CELL_SET, MESHIO_DIVISIONS
 from anisomesh.io.objects.trimesh_scenes import TRIMESH
 from anisomesh.mesh.surface import Surface
@@ -82,31 +90,74 @@ def to_meshio(mesh: Mesh) -> Any:
     """
     meshio = import_module("meshio")
     losses = Losses()
-    features, fixed = mesh.features, mesh.fixed_points
-    cells = [("triangle", mesh.surface.faces), ("line", features), ("vertex", fixed[:, None])]
-    counts = [len(rows) for _, rows in cells if len(rows)]
+    kinds = [
+        _Cells("triangle", mesh.surface.faces, mesh.regions, "regions"),
+        _Cells("line", mesh.features, mesh.feature_regions, OF_FEATURES),
+        _Cells("vertex", mesh.fixed_points[:, None], mesh.fixed_point_regions, OF_FIXED_POINTS),
+    ]
+    kinds = [kind for kind in kinds if len(kind.nodes)]
+    names = dict.fromkeys(name for kind in kinds for name in kind.divisions)
     theirs = {ours: name for name, ours in MESHIO_DIVISIONS.items()}
-    labels = {theirs.get(name, name): regions.labels for name, regions in mesh.regions.items()}
-    sets = {name: regions for name, regions in mesh.regions.items() if name.startswith(CELL_SET)}
-    losses.names_of_regions(mesh, *(name for name in mesh.regions if name not in ("physical", *sets)))
+    labels = {
+        theirs.get(name, name): [kind.labels(name) for kind in kinds] for name in names if not name.startswith(CELL_SET)
+    }
     losses.add("face data", *(name for name in mesh.face_data if name in labels))
     losses.add("materials", *mesh.materials)
-    physical = mesh.regions.get("physical")
-    chosen = {regions.names[k]: np.flatnonzero(regions.labels == k) for regions in sets.values() for k in regions.names}
+    blank = {
+        name: [values, *(_blank(values, len(kind.nodes)) for kind in kinds[1:])]
+        for name, values in mesh.face_data.items()
+    }
     result = meshio.Mesh(
         mesh.surface.points,
-        [(name, np.asarray(rows, dtype=np.int64)) for name, rows in cells if len(rows)],
+        [(kind.name, np.asarray(kind.nodes, dtype=np.int64)) for kind in kinds],
         point_data={**mesh.point_data, **continuous_corner_data(mesh, losses)},
-        cell_data={
-            name: [values, *(_blank(values, count) for count in counts[1:])]
-            for name, values in {**mesh.face_data, **labels}.items()
-            if name not in sets
-        },
-        field_data={} if physical is None else {text: np.array([k, 2]) for k, text in physical.names.items()},
-        cell_sets={name: [rows, *(np.zeros(0, dtype=np.int64) for _ in counts[1:])] for name, rows in chosen.items()},
+        cell_data={**blank, **labels},
+        field_data=_physical_names(kinds, losses),
+        cell_sets=_cell_sets(kinds),
     )
     _warn("meshio", losses)
     return result
+
+
+class _Cells(NamedTuple):
+    """Cells of a type of meshio, their nodes (n, k), and divisions of them, which a warning calls as ``what`` says."""
+
+    name: str
+    nodes: Integers
+    divisions: Mapping[str, Regions]
+    what: str
+
+    def labels(self, name: str) -> Integers:
+        """Return the labels of a division, 0 if there is none of this name."""
+        division = self.divisions.get(name)
+        return np.zeros(len(self.nodes), dtype=np.int64) if division is None else division.labels
+
+
+def _physical_names(kinds: Sequence[_Cells], losses: Losses) -> dict[str, Array]:
+    """Return number and dimension of physical groups by name; names that cells of two types have are lost for one."""
+    found: dict[str, Array] = {}
+    for kind in kinds:
+        lost = [name for name, regions in kind.divisions.items() if regions.names and name != PHYSICAL]
+        losses.add(f"names of {kind.what}", *(name for name in lost if not name.startswith(CELL_SET)))
+        regions = kind.divisions.get(PHYSICAL)
+        for label, text in {} if regions is None else regions.names.items():
+            if text in found:
+                losses.add(f"names of {kind.what}", PHYSICAL)
+            else:
+                found[text] = np.array([label, kind.nodes.shape[1] - 1])
+    return found
+
+
+def _cell_sets(kinds: Sequence[_Cells]) -> dict[str, list[Integers]]:
+    """Return the regions of the divisions into cell sets, with the numbers of cells of each type."""
+    found: dict[str, list[Integers]] = {}
+    for k, kind in enumerate(kinds):
+        for name, regions in kind.divisions.items():
+            if name.startswith(CELL_SET):
+                for label, text in regions.names.items():
+                    rows = found.setdefault(text, [np.zeros(0, dtype=np.int64) for _ in kinds])
+                    rows[k] = np.union1d(rows[k], np.flatnonzero(regions.labels == label)).astype(np.int64)
+    return found
 
 
 def to_trimesh(mesh: Mesh) -> Any:

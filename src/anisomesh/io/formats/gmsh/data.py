@@ -16,7 +16,10 @@ from anisomesh.io.formats.words import whole
 COMMENT = "anisomesh regions"
 """Beginning of the comment that names divisions and regions, in JSON."""
 
-_SURFACE = 2  # dimension
+UNLABELLED = "anisomesh points without region"
+"""Beginning of the comment with the number of the physical group that only makes points fixed."""
+
+_POINT, _LINE, _SURFACE = 0, 1, 2  # dimensions
 _SKIPPED = (b"ElementNodeData", b"Periodic", b"GhostElements", b"PartitionedEntities")
 
 
@@ -46,6 +49,15 @@ def read_comments(data: bytes, carried: Carried) -> dict[str, dict[int, str]]:
     return {}
 
 
+def read_unlabelled(data: bytes) -> int:
+    """Return the number of the physical group of points without a label that a comment of ours has, 0 for none."""
+    for section in sections(data, b"Comments"):
+        found = re.search(rb"^" + UNLABELLED.encode() + rb" (\d{1,10})\s*$", section, re.MULTILINE)
+        if found is not None:
+            return int(found[1])
+    return 0
+
+
 def name_regions(carried: Carried, named: dict[str, dict[int, str]], surface: Integers) -> None:
     """Make cell data divisions that have names of regions, or are called as divisions usually are.
 
@@ -63,20 +75,22 @@ def name_regions(carried: Carried, named: dict[str, dict[int, str]], surface: In
 
 
 def read_physical_names(data: bytes, carried: Carried) -> None:
-    """Name the physical groups of surfaces; the names of others are left out with a remark."""
+    """Name the physical groups of surfaces, lines and points; names of volumes are left out with a remark."""
+    divisions = {
+        _POINT: carried.fixed_points.divisions,
+        _LINE: carried.lines.divisions,
+        _SURFACE: carried.divisions,
+    }
     others = []
     for section in sections(data, b"PhysicalNames"):
         for dimension, number, name in re.findall(rb"^\s*(\d)\s+(-?\d+)\s+\"([^\"\n]*)\"", section, re.MULTILINE):
             text = name.decode("utf-8", errors="replace")
-            if int(dimension) != _SURFACE:
+            if int(dimension) not in divisions:
                 others.append(text)
-            elif PHYSICAL in carried.divisions:
-                carried.divisions[PHYSICAL].names[int(number)] = text
+            elif PHYSICAL in divisions[int(dimension)]:
+                divisions[int(dimension)][PHYSICAL].names[int(number)] = text
     if others:
-        named = ", ".join(others)
-        carried.remarks.append(
-            f"left out physical groups of lines and points, whose edges and points are kept: {named}"
-        )
+        carried.remarks.append(f"left out physical groups of volumes: {', '.join(others)}")
     skipped = [name.decode() for name in _SKIPPED if b"$" + name in data]
     if skipped:
         carried.remarks.append(f"left out its {', '.join(skipped)}")
@@ -85,7 +99,7 @@ def read_physical_names(data: bytes, carried: Carried) -> None:
 def read_entities(data: bytes, numbers: NumberStream, carried: Carried, *, is_40: bool) -> Entities:
     """Return the physical group of each entity of version 4 that has one; the first if it is in several."""
     entities: Entities = {}
-    n_several = 0
+    n_several = [0, 0, 0, 0]
     for section in sections(data, b"Entities"):
         with carried.optional("the physical groups"):
             stream = numbers.of(section)
@@ -99,9 +113,10 @@ def read_entities(data: bytes, numbers: NumberStream, carried: Carried, *, is_40
                         _tags(stream)
                     if groups:
                         entities[dimension, tag] = abs(groups[0])  # negative: turned
-                    n_several += dimension == _SURFACE and len(groups) > 1
-    if n_several:
-        carried.remarks.append(f"{n_several} surface(s) are in several physical groups and kept in the first only")
+                    n_several[dimension] += len(groups) > 1
+    for count, what in zip(n_several, ("point(s)", "curve(s)", "surface(s)"), strict=False):
+        if count:
+            carried.remarks.append(f"{count} {what} are in several physical groups and kept in the first only")
     return entities
 
 

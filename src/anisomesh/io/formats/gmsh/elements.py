@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from anisomesh.io.carried import Carried, Integers
+from anisomesh.io.carried import Carried, Integers, Marked
 from anisomesh.io.cells import N_CORNERS, Shape, SurfaceCells
 from anisomesh.io.formats.gmsh.numbers import NumberStream
 from anisomesh.io.formats.words import whole
@@ -53,8 +53,7 @@ class Elements:
         self._tags: list[tuple[Integers, Integers]] = []  # cells, rows of number, physical group, entity
         self._count = 0
         self._surface: list[Integers] = [np.zeros(0, dtype=np.int64)]
-        self._lines: list[Integers] = []
-        self._points: list[Integers] = []
+        self._lines, self._points = Marked(), Marked()
 
     def take_numbers(self, count: int) -> Integers:
         """Return numbers (count,) for the next cells of the file, counted from 0."""
@@ -84,20 +83,25 @@ class Elements:
             return
         self.cells.ignore(_NAMES[kind], len(nodes))
         if _NAMES[kind] == "line":
-            self._lines.append(self._table.found(nodes[:, : 3 if kind == _QUADRATIC_LINE else 2]))
+            nodes = nodes[:, : 3 if kind == _QUADRATIC_LINE else 2]
+            known = self._table.has(nodes).all(axis=1)
+            self._lines.add(self._table.indices(nodes[known]), source[known])
         elif kind == POINT:
-            self._points.append(self._table.found(nodes[tags[:, 1] != 0])[:, 0])
+            known = self._table.has(nodes[:, 0]) & (tags[:, 1] != 0)
+            self._points.add(self._table.indices(nodes[known, 0]), source[known])
 
-    def carry(self, carried: Carried, named: Collection[str]) -> Integers:
+    def carry(self, carried: Carried, named: Collection[str], unlabelled: int) -> Integers:
         """Add lines, points and divisions to what the file carries; return the numbers of the elements (n,).
 
-        Divisions that are ``named`` are added in any case, others only if they are not trivial.
+        Divisions that are ``named`` are added in any case, others only if they are not trivial. Points of the physical
+        group ``unlabelled`` have no label.
         """
-        carried.lines += self._lines
-        carried.fixed_points += self._points
+        carried.lines, carried.fixed_points = self._lines, self._points
         table = np.zeros((self._count, 3), dtype=np.int64)
         for source, tags in self._tags:
             table[source] = tags
+        carried.lines.divide(PHYSICAL, table[:, 1])
+        carried.fixed_points.divide(PHYSICAL, np.where(table[:, 1] == unlabelled, 0, table[:, 1]))
         physical, entity = table[self.surface][:, 1:].T
         if physical.any() or PHYSICAL in named:
             carried.add_cell_data(PHYSICAL, table[:, 1], names={})
@@ -193,7 +197,7 @@ class TagTable:
 
     def indices(self, tags: npt.NDArray[Any]) -> Integers:
         """Return the indices of the nodes with these tags, of the same shape."""
-        if len(self._sorted) == 0:
+        if len(self._sorted) == 0 and np.size(tags):
             raise ValueError("it has elements but no node")
         place = np.minimum(np.searchsorted(self._sorted, tags), len(self._sorted) - 1)
         missing = self._sorted[place] != tags
@@ -202,7 +206,6 @@ class TagTable:
         found: Integers = self._order[place]
         return found
 
-    def found(self, tags: npt.NDArray[Any]) -> Integers:
-        """Return the indices of nodes with these tags (n, k), without rows that have a tag of no node."""
-        known = np.isin(tags, self._sorted).all(axis=1)
-        return self.indices(tags[known]) if known.any() else np.zeros((0, tags.shape[1]), dtype=np.int64)
+    def has(self, tags: npt.NDArray[Any]) -> npt.NDArray[np.bool_]:
+        """Return whether nodes have these tags, of the same shape."""
+        return np.isin(tags, self._sorted)

@@ -17,6 +17,7 @@ from anisomesh.io.formats.gmsh.data import (
     read_data,
     read_entities,
     read_physical_names,
+    read_unlabelled,
 )
 from anisomesh.io.formats.gmsh.elements import Elements, TagTable, elements_2_binary, elements_2_text, elements_4
 from anisomesh.io.formats.gmsh.numbers import NumberStream
@@ -50,7 +51,7 @@ def read_msh(data: bytes) -> PolygonSoup:
     else:
         elements_2_text(section, elements)
     named = read_comments(data, carried)
-    cell_numbers = elements.carry(carried, named)
+    cell_numbers = elements.carry(carried, named, read_unlabelled(data))
     read_physical_names(data, carried)
     read_data(data, numbers, carried, (tags, cell_numbers))
     name_regions(carried, named, elements.surface)

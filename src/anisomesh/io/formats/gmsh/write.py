@@ -4,18 +4,24 @@ from __future__ import annotations
 
 import json
 from collections.abc import Mapping
+from typing import NamedTuple
 
 import numpy as np
 
+from anisomesh._arrays import Points
 from anisomesh.attributes.model import Mesh, Regions
 from anisomesh.io.carried import Array, Integers, separate_columns
-from anisomesh.io.formats.gmsh.data import COMMENT
+from anisomesh.io.formats.gmsh.data import COMMENT, UNLABELLED
 from anisomesh.io.formats.gmsh.elements import LINE, PHYSICAL, POINT, TRIANGLE, entities_of
 from anisomesh.io.formats.region_names import in_a_line, region_texts
 from anisomesh.io.holding import (
+    OF_FEATURES,
+    OF_FIXED_POINTS,
     Losses,
     continuous_corner_data,
+    fits_int32,
     flat_rows,
+    held_division,
     is_exact_in_float64,
     main_division,
     numeric,
@@ -30,20 +36,23 @@ def msh_bytes(mesh: Mesh, losses: Losses) -> bytes:
     Notes
     -----
     One division is the physical groups, and the one called ``geometrical`` the entities; others are element data.
-    Features are lines, fixed points are points of the physical group 1. Data are float64.
+    Features are lines and fixed points are points, with physical groups of their own. Points in no region are in a
+    group that a comment names, since points without a group are no fixed points. Data are float64.
     """
-    points, faces = mesh.surface.points, mesh.surface.faces
+    faces = mesh.surface.faces
     physical, geometrical, others = _divisions(mesh, losses)
     names = {} if physical is None else region_texts(physical, Losses(), _quotable)
-    nodes = np.zeros(len(points), dtype=[("tag", "<i4"), ("xyz", "<f8", 3)])
-    nodes["tag"], nodes["xyz"] = np.arange(1, len(points) + 1), points
     labels = np.zeros(len(faces), dtype=np.int64) if physical is None else physical.labels
+    curves = _marked(mesh.features, mesh.feature_regions, OF_FEATURES, losses)
+    vertices = _marked(mesh.fixed_points[:, None], mesh.fixed_point_regions, OF_FIXED_POINTS, losses)
+    unlabelled = _unused_number(vertices.physical) if (vertices.physical == 0).any() else 0
+    groups = np.where(vertices.physical == 0, unlabelled, vertices.physical)
     parts = [
         _elements(TRIANGLE, faces, labels, geometrical, 1),
-        _elements(LINE, mesh.features, 0, 1, 1 + len(faces)),
-        _elements(POINT, mesh.fixed_points[:, None], 1, 1, 1 + len(faces) + len(mesh.features)),
+        _elements(LINE, curves.nodes, curves.physical, entities_of(curves.physical), 1 + len(faces)),
+        _elements(POINT, vertices.nodes, groups, entities_of(groups), 1 + len(faces) + len(curves.nodes)),
     ]
-    n_others = len(mesh.features) + len(mesh.fixed_points)
+    n_others = len(curves.nodes) + len(vertices.nodes)
     point_data = {**mesh.point_data, **continuous_corner_data(mesh, losses)}
     for name in (*point_data, *mesh.face_data):
         if _quotable(name) != name:
@@ -52,9 +61,9 @@ def msh_bytes(mesh: Mesh, losses: Losses) -> bytes:
     return b"".join(
         [
             b"$MeshFormat\n2.2 1 8\n" + (1).to_bytes(4, "little") + b"\n$EndMeshFormat\n",
-            _comments(mesh, physical, names),
-            _physical_names(physical, names),
-            b"$Nodes\n%d\n" % len(points) + nodes.tobytes() + b"\n$EndNodes\n",
+            _comments(mesh, physical, names, unlabelled),
+            _physical_names(vertices.names, curves.names, _given_names(physical, names)),
+            _nodes(mesh.surface.points),
             b"$Elements\n%d\n" % (len(faces) + n_others) + b"".join(parts) + b"\n$EndElements\n",
             *_data("NodeData", _exact(point_data, "point data", losses), 0),
             *_data("ElementData", {**_exact(mesh.face_data, "face data", losses), **others}, n_others),
@@ -69,15 +78,44 @@ def _exact(data: Mapping[str, Array], what: str, losses: Losses) -> dict[str, Ar
     return {name: values for name, values in numbers.items() if is_exact_in_float64(values)}
 
 
+def _nodes(points: Points) -> bytes:
+    rows = np.zeros(len(points), dtype=[("tag", "<i4"), ("xyz", "<f8", 3)])
+    rows["tag"], rows["xyz"] = np.arange(1, len(points) + 1), points
+    return b"$Nodes\n%d\n" % len(points) + rows.tobytes() + b"\n$EndNodes\n"
+
+
+class _Marked(NamedTuple):
+    """Elements of lines or points: their nodes (n, k), their physical groups (n,), 0 for none, and names of these."""
+
+    nodes: Integers
+    physical: Integers
+    names: dict[int, str]
+
+
+def _marked(nodes: Integers, regions: Mapping[str, Regions], what: str, losses: Losses) -> _Marked:
+    """Return features or fixed points with one division of them as physical groups."""
+    usable = {name: division for name, division in regions.items() if fits_int32(division.labels)}
+    losses.add(what, *(name for name in regions if name not in usable))
+    division = held_division(usable, what, losses, PHYSICAL, with_names=True)
+    if division is None:
+        return _Marked(nodes, np.zeros(len(nodes), dtype=np.int64), {})
+    names = _given_names(division, region_texts(division, losses, _quotable))
+    return _Marked(nodes, division.labels, {label: text for label, text in names.items() if label != 0})
+
+
+def _unused_number(labels: Integers) -> int:
+    """Return the smallest positive number that is no label (n,)."""
+    return int(np.setdiff1d(np.arange(1, len(labels) + 2), labels)[0])
+
+
 def _divisions(mesh: Mesh, losses: Losses) -> tuple[Regions | None, Integers, dict[str, Array]]:
     """Return the physical groups, the entities (F,), and other divisions as element data."""
     usable = {}
-    limits = np.iinfo(np.int32)
     for name, regions in mesh.regions.items():
-        if regions.labels.min() < limits.min or regions.labels.max() > limits.max:
-            losses.add("regions", name)
-        else:
+        if fits_int32(regions.labels):
             usable[name] = regions
+        else:
+            losses.add("regions", name)
     entities = usable.pop("geometrical", None)
     found = main_division(usable, "physical")
     physical = None if found is None else usable.pop(found[0])
@@ -100,24 +138,32 @@ def _elements(kind: int, nodes: Array, physical: Integers | int, entity: Integer
     return np.array([kind, len(nodes), 2], dtype="<i4").tobytes() + rows.tobytes()
 
 
-def _comments(mesh: Mesh, physical: Regions | None, names: Mapping[int, str]) -> bytes:
+def _comments(mesh: Mesh, physical: Regions | None, names: Mapping[int, str], unlabelled: int) -> bytes:
     """Return the names of divisions and regions that no section of Gmsh has, in a section that it skips."""
     kept = {name: dict(regions.names) for name, regions in mesh.regions.items() if regions is not physical}
     if physical is not None:
         changed = {label: text for label, text in physical.names.items() if text and names.get(label, text) != text}
         if changed or not physical.labels.any():
             kept[PHYSICAL] = changed
-    if not kept:
-        return b""
-    text = json.dumps(kept).replace("$", "\\u0024")  # with which sections begin
-    return f"$Comments\n{COMMENT} {text}\n$EndComments\n".encode()
+    lines = []
+    if kept:
+        text = json.dumps(kept).replace("$", "\\u0024")  # with which sections begin
+        lines.append(f"{COMMENT} {text}\n")
+    if unlabelled:
+        lines.append(f"{UNLABELLED} {unlabelled}\n")
+    return f"$Comments\n{''.join(lines)}$EndComments\n".encode() if lines else b""
 
 
-def _physical_names(physical: Regions | None, names: Mapping[int, str]) -> bytes:
-    given = {} if physical is None else {label: text for label, text in names.items() if physical.names.get(label)}
-    if not given:
+def _given_names(regions: Regions | None, texts: Mapping[int, str]) -> dict[int, str]:
+    """Return the texts of the regions that have a name."""
+    return {} if regions is None else {label: text for label, text in texts.items() if regions.names.get(label)}
+
+
+def _physical_names(*names: Mapping[int, str]) -> bytes:
+    """Return the section of the names of physical groups of each dimension, from points on."""
+    lines = [f'{dimension} {label} "{text}"' for dimension, of in enumerate(names) for label, text in of.items()]
+    if not lines:
         return b""
-    lines = [f'2 {label} "{text}"' for label, text in given.items()]
     return "\n".join(["$PhysicalNames", str(len(lines)), *lines, "$EndPhysicalNames\n"]).encode()
 
 

@@ -16,7 +16,7 @@ from anisomesh.io.formats.words import whole
 from anisomesh.io.polygons import PolygonSoup
 
 REFERENCE = "reference"
-"""Name of the references of triangles as a division, and of vertices as point data."""
+"""Name of the references of triangles, edges and fixed points as divisions, and of vertices as point data."""
 
 # Shape and number of nodes; corners come first, then in cells of second order the nodes of the sides and the middle.
 _SURFACES: dict[bytes, tuple[Shape, int]] = {
@@ -42,6 +42,7 @@ def read_medit(data: bytes) -> PolygonSoup:
     Notes
     -----
     Ridges, required edges and edges with a reference are features; corners and required vertices are fixed points.
+    References of vertices are point data, or a division of the fixed points if no other vertices have one.
     """
     tokens = re.sub(rb"#[^\n]*", b"", data).split()
     if not tokens or not tokens[0].startswith(b"MeshVersionFormatted"):
@@ -86,15 +87,19 @@ def _carried(
     with carried.optional("the references of faces"):
         if of_cells.any():
             carried.add_cell_data(REFERENCE, whole(of_cells), names={})
-    with carried.optional("the references of vertices"):
-        if of_points.any():
-            carried.point_data[REFERENCE] = whole(of_points)
     with carried.optional("the edges"):
         _take_edges(sections, carried)
     for name in _MARKED_POINTS:
         with carried.optional(f"the section {name.decode()}"):
             if name in sections:
-                carried.fixed_points.append(whole(_rows(name, sections[name], 1))[:, 0] - 1)
+                points = whole(_rows(name, sections[name], 1))[:, 0] - 1
+                carried.fixed_points.add(points, np.where((points >= 0) & (points < len(of_points)), points, -1))
+    with carried.optional("the references of vertices"):
+        fixed = np.unique(np.concatenate([np.zeros(0, dtype=np.int64), *carried.fixed_points.blocks]))
+        if len(fixed) < len(of_points) and np.isin(np.flatnonzero(of_points), fixed).all():
+            carried.fixed_points.divide(REFERENCE, whole(of_points))
+        elif of_points.any():
+            carried.point_data[REFERENCE] = whole(of_points)
     with carried.optional("the normals"):
         if b"NormalAtVertices" in sections:
             normals = _rows(b"Normals", sections.get(b"Normals", []), dimension)
@@ -114,13 +119,12 @@ def _take_edges(sections: dict[bytes, list[bytes]], carried: Carried) -> None:
         return
     rows = whole(_rows(b"Edges", sections[b"Edges"], 3))
     chosen = rows[:, 2] != 0
-    if chosen.any():
-        carried.remarks.append("left out the references of edges")
     for name in _MARKED_EDGES:
         with carried.optional(f"the section {name.decode()}"):
             if name in sections:
                 chosen[_within(whole(_rows(name, sections[name], 1))[:, 0] - 1, len(rows))] = True
-    carried.lines.append(rows[chosen, :2] - 1)
+    carried.lines.add(rows[chosen, :2] - 1, np.flatnonzero(chosen))
+    carried.lines.divide(REFERENCE, rows[:, 2])
 
 
 def _within(numbers: Integers, count: int) -> Integers:

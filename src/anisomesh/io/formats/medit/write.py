@@ -4,11 +4,18 @@ from __future__ import annotations
 
 import numpy as np
 
-from anisomesh.attributes.model import Mesh
+from anisomesh.attributes.model import Mesh, Regions
 from anisomesh.io.carried import NORMAL, Array, Integers
 from anisomesh.io.formats.medit.read import REFERENCE
 from anisomesh.io.formats.words import format_rows
-from anisomesh.io.holding import Losses, continuous_corner_data, main_division
+from anisomesh.io.holding import (
+    OF_FEATURES,
+    OF_FIXED_POINTS,
+    Losses,
+    continuous_corner_data,
+    held_division,
+    main_division,
+)
 
 
 def medit_bytes(mesh: Mesh, losses: Losses) -> bytes:
@@ -16,8 +23,8 @@ def medit_bytes(mesh: Mesh, losses: Losses) -> bytes:
 
     Notes
     -----
-    One division is the references of triangles, point data ``reference`` the references of vertices. Features are
-    required edges, fixed points required vertices and corners.
+    One division each is the references of triangles, of edges, which features are, and of required vertices, which
+    fixed points are. Point data ``reference`` are the references of vertices in place of the last.
     """
     points, faces = mesh.surface.points, mesh.surface.faces
     vertices = np.zeros(len(points), dtype=np.int64)
@@ -32,8 +39,11 @@ def medit_bytes(mesh: Mesh, losses: Losses) -> bytes:
     given, normals = point_data.pop(REFERENCE, None), point_data.pop(NORMAL, None)
     if given is not None and given.ndim == 1 and given.dtype.kind in "iub":
         vertices = given.astype(np.int64)
-    elif given is not None:
-        losses.add("point data", REFERENCE)
+        losses.add(OF_FIXED_POINTS, *mesh.fixed_point_regions)  # whose place the point data take
+    else:
+        losses.add("point data", *([] if given is None else [REFERENCE]))
+        of_points = held_division(mesh.fixed_point_regions, OF_FIXED_POINTS, losses, REFERENCE)
+        vertices[mesh.fixed_points] = 0 if of_points is None else of_points.labels
     losses.add("point data", *point_data)
     losses.add("face data", *mesh.face_data)
     losses.add("materials", *mesh.materials)
@@ -43,7 +53,7 @@ def medit_bytes(mesh: Mesh, losses: Losses) -> bytes:
             _lines("%r %r %r %d\n", points, vertices),
             f"Triangles\n{len(faces)}\n",
             _lines("%d %d %d %d\n", faces + 1, references),
-            _edges(mesh.features),
+            _edges(mesh.features, held_division(mesh.feature_regions, OF_FEATURES, losses, REFERENCE)),
             _points(mesh.fixed_points),
             _normals(normals, losses),
             "End\n",
@@ -57,10 +67,10 @@ def _lines(pattern: str, rows: Array, references: Integers) -> str:
     return "".join(map(pattern.__mod__, zip(*columns, strict=True)))
 
 
-def _edges(features: Integers) -> str:
+def _edges(features: Integers, division: Regions | None) -> str:
     if len(features) == 0:
         return ""
-    edges = format_rows("%d %d 0\n", features + 1)
+    edges = _lines("%d %d %d\n", features + 1, np.zeros(len(features), int) if division is None else division.labels)
     required = format_rows("%d\n", np.arange(1, len(features) + 1))
     return f"Edges\n{len(features)}\n{edges}RequiredEdges\n{len(features)}\n{required}"
 

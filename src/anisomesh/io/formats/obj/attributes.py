@@ -141,6 +141,6 @@ def take_lines(file: Lines, carried: Carried) -> None:
                 if len(points) < fewest or 0 in raw or (points < 0).any() or (points >= len(file.point_lines)).any():
                     raise ValueError(f"it reads {file.lines[k][:40]!r}")
                 if word == b"l":
-                    carried.lines.append(np.stack([points[:-1], points[1:]], axis=1))
+                    carried.lines.add(np.stack([points[:-1], points[1:]], axis=1))
                 else:
-                    carried.fixed_points.append(points)
+                    carried.fixed_points.add(points)

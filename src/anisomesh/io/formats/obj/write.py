@@ -41,6 +41,7 @@ def obj_bytes(mesh: Mesh, losses: Losses) -> bytes:
     held += [] if _colours(mesh) is None else [COLOUR]
     losses.add("point data", *(name for name in mesh.point_data if name not in held))
     losses.add("materials", *(name for name in mesh.materials if name != "obj"))
+    losses.divisions_of_features(mesh)
     return "".join(lines).encode("utf-8", errors="replace")
 
 

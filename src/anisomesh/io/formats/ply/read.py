@@ -63,7 +63,7 @@ def read_ply(data: bytes) -> PolygonSoup:
                 _add_face_data(element, columns, corners, carried)
         elif element.name == "edge" and {"vertex1", "vertex2"} <= columns.keys():
             ends = [columns.pop(name).values.astype(np.int64) for name in ("vertex1", "vertex2")]
-            carried.lines.append(np.stack(ends, axis=1))
+            carried.lines.add(np.stack(ends, axis=1))
             if columns:
                 carried.remarks.append(f"left out the properties {', '.join(columns)} of edges")
         elif element.count:

@@ -45,6 +45,7 @@ def ply_bytes(mesh: Mesh, losses: Losses) -> bytes:
     losses.add("materials", *(name for name in mesh.materials if name != "texture_files"))
     if len(mesh.fixed_points):
         losses.say(f"{len(mesh.fixed_points)} fixed point(s)")
+    losses.divisions_of_features(mesh)
     elements = [
         ("vertex", vertex, {}),
         ("face", {name: values for name, values in face.items() if name != "vertex_indices"}, lists),

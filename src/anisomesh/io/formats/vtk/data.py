@@ -17,6 +17,9 @@ NAMES_OF_REGIONS = "regions of "
 They are text in UTF-8 as bytes, since not every library reads strings: lines of a label and, after a space, its name.
 """
 
+NAMES_OF_FEATURE_REGIONS, NAMES_OF_POINT_REGIONS = "line regions of ", "vertex regions of "
+"""The same for divisions of lines and of vertices."""
+
 ORIGINAL_POINT = "original point"
 """Name of our array of global numbers, which points that are repeated have in common."""
 
@@ -93,14 +96,20 @@ def read_field_data(root: Element, kind: str, arrays: ArrayReader, carried: Carr
     return found
 
 
-def names_of_regions(fields: dict[str, Array], carried: Carried) -> dict[str, dict[int, str]]:
-    """Return the names of regions by division, from field data; other field data are materials."""
-    names: dict[str, dict[int, str]] = {}
+def names_of_regions(fields: dict[str, Array], carried: Carried) -> list[dict[str, dict[int, str]]]:
+    """Return the names of regions by division, of vertices, lines and faces each, from field data.
+
+    Other field data are materials.
+    """
+    beginnings = (NAMES_OF_POINT_REGIONS, NAMES_OF_FEATURE_REGIONS, NAMES_OF_REGIONS)
+    names: list[dict[str, dict[int, str]]] = [{}, {}, {}]
     others: dict[str, Array] = {}
     for name, values in fields.items():
         with carried.optional(f"FieldData {name!r}"):
-            if name.startswith(NAMES_OF_REGIONS) and values.dtype == np.uint8:
-                names[name.removeprefix(NAMES_OF_REGIONS)] = _labels(values.tobytes().decode("utf-8", errors="replace"))
+            found = [k for k, beginning in enumerate(beginnings) if name.startswith(beginning)]
+            if found and values.dtype == np.uint8:
+                key = name.removeprefix(beginnings[found[0]])
+                names[found[0]][key] = _labels(values.tobytes().decode("utf-8", errors="replace"))
             else:
                 others[name] = values
     if others:

@@ -11,9 +11,9 @@ import numpy.typing as npt
 
 from anisomesh.io.carried import Array, Carried
 from anisomesh.io.cells import SurfaceCells
+from anisomesh.io.formats.vtk.cells import add_vtk_cells, add_vtk_lines
 from anisomesh.io.formats.vtk.data import ORIGINAL_POINT, DataOfPieces, names_by_meaning, names_of_regions
 from anisomesh.io.polygons import Integers, PolygonSoup
-from anisomesh.io.vtk_cells import add_vtk_cells, add_vtk_lines
 
 # Bits of the array vtkGhostType: https://vtk.org/doc/nightly/html/classvtkDataSetAttributes.html.
 _GHOSTS, _GHOST_LEVELS = "vtkGhostType", "vtkGhostLevels"  # the second of VTK 6 and older: 0 or the layer of the ghost
@@ -63,8 +63,8 @@ class Pieces:
         self._numbers = piece.active.get("GlobalIds", "") or self._numbers
         piece = self._without_ghosts(piece)
         connectivity = _shifted(piece.connectivity, first, self._n_points)
-        add_vtk_cells(self._cells, piece.types, connectivity, piece.offsets)
-        add_vtk_lines(self.carried, piece.types, connectivity, piece.offsets)
+        numbers = add_vtk_cells(self._cells, piece.types, connectivity, piece.offsets)
+        add_vtk_lines(self.carried, piece.types, connectivity, piece.offsets, numbers)
         self._point_data.add(piece.point_data, self._n_points - first)
         self._cell_data.add(piece.cell_data, len(piece.types))
 
@@ -106,7 +106,7 @@ class Pieces:
         for name, values in self._point_data.all(carried).items():
             carried.point_data[self._ours.get(name, name)] = values
         for name, values in self._cell_data.all(carried).items():
-            carried.add_cell_data(name, values, names=names.get(name))
+            carried.add_data_of_all_cells(name, values, [of.get(name) for of in names])
         for count, what in ((self._n_copies, "ghosts, which are copies of others"), (self._n_hidden, "hidden")):
             remarks += (f"left out {count} cell(s) marked as {what}",) if count else ()
         soup = self._cells.soup(np.concatenate(self._points), remarks, carried)
@@ -149,6 +149,6 @@ def _joined(soup: PolygonSoup, numbers: Array) -> PolygonSoup:
             carried.corner_data[name] = carried.point_data.pop(name)[soup.corners]
         else:
             carried.point_data[name] = values[chosen]
-    carried.lines = [place[line] for line in carried.lines]
-    carried.fixed_points = [place[points] for points in carried.fixed_points]
+    for marked in (carried.lines, carried.fixed_points):
+        marked.blocks = [place[block] for block in marked.blocks]
     return replace(soup, points=soup.points[chosen], corners=place[soup.corners])

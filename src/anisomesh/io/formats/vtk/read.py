@@ -14,10 +14,10 @@ import numpy.typing as npt
 
 from anisomesh.io.carried import Array
 from anisomesh.io.formats.vtk.arrays import ArrayReader
+from anisomesh.io.formats.vtk.cells import LINE, POLYGON, STRIP, VERTEX
 from anisomesh.io.formats.vtk.data import active_arrays, read_field_data, read_section
 from anisomesh.io.formats.vtk.pieces import Piece, Pieces
 from anisomesh.io.polygons import PolygonSoup
-from anisomesh.io.vtk_cells import LINE, POLYGON, STRIP, VERTEX
 
 _ORDERS = {"LittleEndian": "<", "BigEndian": ">"}
 _HEADERS = {"UInt32": "u4", "UInt64": "u8"}

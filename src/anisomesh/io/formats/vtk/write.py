@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from typing import Any, NamedTuple
 from xml.sax.saxutils import quoteattr
@@ -11,21 +11,28 @@ import numpy as np
 import numpy.typing as npt
 
 from anisomesh._arrays import Points
-from anisomesh.attributes.model import Mesh
+from anisomesh.attributes.model import Mesh, Regions
 from anisomesh.io.carried import NORMAL, UV, Array
 from anisomesh.io.formats.region_names import in_a_line, region_texts
 from anisomesh.io.formats.vtk.arrays import packed_array, string_codes, type_name
-from anisomesh.io.formats.vtk.data import NAMES_OF_REGIONS, ORIGINAL_POINT
+from anisomesh.io.formats.vtk.cells import LINE, POLYGON, QUAD, TRIANGLE, VERTEX
+from anisomesh.io.formats.vtk.data import (
+    NAMES_OF_FEATURE_REGIONS,
+    NAMES_OF_POINT_REGIONS,
+    NAMES_OF_REGIONS,
+    ORIGINAL_POINT,
+)
 from anisomesh.io.holding import (
+    OF_FEATURES,
+    OF_FIXED_POINTS,
     Losses,
     continuous_corner_data,
     flat_rows,
+    narrowed,
     numeric,
-    regions_as_integers,
     with_points_repeated,
 )
 from anisomesh.io.polygons import Integers
-from anisomesh.io.vtk_cells import LINE, POLYGON, QUAD, TRIANGLE, VERTEX
 
 Data = Mapping[str, npt.NDArray[Any]]
 
@@ -45,8 +52,7 @@ def vtu_mesh_bytes(mesh: Mesh, losses: Losses) -> bytes:
     types = np.repeat(np.array([TRIANGLE, LINE, VERTEX], dtype=np.uint8), [len(faces), len(lines), len(vertices)])
     connectivity = np.concatenate([faces.ravel(), lines.ravel(), vertices]).astype(np.int64)
     cells: Data = {"connectivity": connectivity, "offsets": np.cumsum(sizes), "types": types}
-    point_data, cell_data, fields = _data(mesh, losses)
-    cell_data = {name: _padded(values, 0, len(lines) + len(vertices)) for name, values in cell_data.items()}
+    point_data, cell_data, fields = _data(mesh, losses, ("faces", "lines", "vertices"))
     counts = f'NumberOfCells="{len(sizes)}"'
     return _file("UnstructuredGrid", points, counts, {"Cells": cells}, (point_data, cell_data, fields))
 
@@ -81,25 +87,38 @@ def vtk_polygons(mesh: Mesh, losses: Losses) -> tuple[Mesh, Polygons]:
     if len(np.unique(source)) < len(source):
         mesh = replace(mesh, point_data={**mesh.point_data, ORIGINAL_POINT: source})
     found = {"Verts": mesh.fixed_points[:, None], "Lines": mesh.features, "Polys": mesh.surface.faces}
-    n_before = len(mesh.fixed_points) + len(mesh.features)
-    point_data, cell_data, fields = _data(mesh, losses)
-    cell_data = {name: _padded(values, n_before, 0) for name, values in cell_data.items()}
-    cells = {name: rows.astype(np.int64) for name, rows in found.items()}
-    return mesh, Polygons(cells, (point_data, cell_data, fields))
+    data = _data(mesh, losses, ("vertices", "lines", "faces"))
+    return mesh, Polygons({name: rows.astype(np.int64) for name, rows in found.items()}, data)
 
 
-def _data(mesh: Mesh, losses: Losses) -> tuple[dict[str, Array], dict[str, Array], dict[str, Array]]:
-    """Return the point, cell and field data that hold what a mesh carries."""
+def _data(
+    mesh: Mesh, losses: Losses, order: Sequence[str]
+) -> tuple[dict[str, Array], dict[str, Array], dict[str, Array]]:
+    """Return the point, cell and field data that hold what a mesh carries.
+
+    ``order`` is the one of the cells: of ``"faces"``, ``"lines"`` and ``"vertices"``.
+    """
     point_data = _storable({**mesh.point_data, **continuous_corner_data(mesh, losses)}, "point data", losses)
     cell_data = _storable(mesh.face_data, "face data", losses)
     losses.add("face data", *(name for name in mesh.regions if name in cell_data))
-    cell_data |= regions_as_integers(mesh, list(mesh.regions))
-    fields = {}
-    for name, division in mesh.regions.items():
-        texts = region_texts(division, losses, in_a_line)
-        lines = [f"{label} {text}" for label, text in texts.items() if division.names.get(label)]
-        text = "\n".join(lines or [str(division.labels[0])])
-        fields[NAMES_OF_REGIONS + name] = np.frombuffer(text.encode("utf-8", errors="replace"), np.uint8)
+    counts = {"faces": mesh.surface.n_faces, "lines": len(mesh.features), "vertices": len(mesh.fixed_points)}
+    none = {kind: np.zeros(counts[kind], dtype=np.int64) for kind in order}
+    labels, fields = dict[str, dict[str, Integers]](), dict[str, Array]()
+    for kind, beginning, divisions, what in (
+        ("faces", NAMES_OF_REGIONS, mesh.regions, "regions"),
+        ("lines", NAMES_OF_FEATURE_REGIONS, mesh.feature_regions, OF_FEATURES),
+        ("vertices", NAMES_OF_POINT_REGIONS, mesh.fixed_point_regions, OF_FIXED_POINTS),
+    ):
+        for name, division in divisions.items():
+            if kind != "faces" and not division.labels.any():
+                continue
+            if name in cell_data and name not in mesh.regions:
+                losses.add(what, name)
+                continue
+            labels.setdefault(name, dict(none))[kind] = division.labels
+            fields[beginning + name] = _names(division, losses)
+    cell_data = {name: _padded(values, order, counts) for name, values in cell_data.items() if name not in labels}
+    cell_data |= {name: narrowed(np.concatenate(list(parts.values()))) for name, parts in labels.items()}
     given = mesh.materials.get("field_data", {})
     if isinstance(given, Mapping):
         fields |= _storable({name: np.asarray(values) for name, values in given.items()}, "field data", losses)
@@ -115,13 +134,22 @@ def _storable(data: Mapping[str, Array], what: str, losses: Losses) -> dict[str,
     return {**{name: flat_rows(values) for name, values in numbers.items()}, **strings}
 
 
-def _padded(values: Array, before: int, after: int) -> Array:
-    """Return an array with rows in front and behind of NaN, 0 or empty strings."""
-    if before + after == 0:
-        return values
+def _names(division: Regions, losses: Losses) -> Array:
+    """Return the names of regions as lines of a label and a name, in bytes; a label if there are none."""
+    texts = region_texts(division, losses, in_a_line)
+    lines = [f"{label} {text}" for label, text in texts.items() if division.names.get(label)]
+    text = "\n".join(lines or [str(division.labels[0])])
+    return np.frombuffer(text.encode("utf-8", errors="replace"), np.uint8)
+
+
+def _padded(values: Array, order: Sequence[str], counts: Mapping[str, int]) -> Array:
+    """Return an array of faces with rows of NaN, 0 or empty strings for lines and vertices."""
     fill: Any = {"f": np.nan, "U": ""}.get(values.dtype.kind, 0)
-    rows = [np.full((count, *values.shape[1:]), fill, dtype=values.dtype) for count in (before, after)]
-    return np.concatenate([rows[0], values, rows[1]])
+    rows = [
+        values if kind == "faces" else np.full((counts[kind], *values.shape[1:]), fill, dtype=values.dtype)
+        for kind in order
+    ]
+    return np.concatenate(rows)
 
 
 def vtu_bytes(

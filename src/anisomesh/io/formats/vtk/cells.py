@@ -34,8 +34,8 @@ _VTK_OTHERS = {
 
 def add_vtk_cells(
     cells: SurfaceCells, types: npt.NDArray[Any], connectivity: npt.NDArray[Any], offsets: npt.NDArray[Any]
-) -> None:
-    """Add cells as an unstructured grid of VTK has them.
+) -> Integers:
+    """Add cells as an unstructured grid of VTK has them, and return their numbers (n,) among all cells.
 
     Parameters
     ----------
@@ -71,10 +71,16 @@ def add_vtk_cells(
         else:
             nodes = connectivity[(ends[chosen] - size)[:, None] + np.arange(size)]
             _add_surface_cells(cells, cell_type, nodes, source[chosen])
+    return source
 
 
-def add_vtk_lines(carried: Carried, types: npt.NDArray[Any], connectivity: Integers, offsets: npt.NDArray[Any]) -> None:
-    """Add the lines of a valid grid, and its vertices as fixed points; parameters as for :func:`add_vtk_cells`."""
+def add_vtk_lines(
+    carried: Carried, types: npt.NDArray[Any], connectivity: Integers, offsets: npt.NDArray[Any], numbers: Integers
+) -> None:
+    """Add the lines of a valid grid, and its vertices as fixed points.
+
+    ``numbers`` are the ones that :func:`add_vtk_cells` returns, whose parameters the others are.
+    """
     types, ends = np.asarray(types, dtype=np.int64), np.asarray(offsets, dtype=np.int64)
     sizes = np.diff(ends, prepend=0)
     for cell_type, size in ((VERTEX, 1), (_POLY_VERTEX, 0), (LINE, 0), (_POLY_LINE, 0), (_QUADRATIC_EDGE, 3)):
@@ -84,14 +90,14 @@ def add_vtk_lines(carried: Carried, types: npt.NDArray[Any], connectivity: Integ
         if cell_type in (VERTEX, _POLY_VERTEX):
             rows = np.repeat(ends[chosen] - sizes[chosen], sizes[chosen])
             step = np.arange(len(rows)) - np.repeat(np.cumsum(sizes[chosen]) - sizes[chosen], sizes[chosen])
-            carried.fixed_points.append(connectivity[rows + step])
+            carried.fixed_points.add(connectivity[rows + step], np.repeat(numbers[chosen], sizes[chosen]))
         elif cell_type == _QUADRATIC_EDGE:
-            carried.lines.append(connectivity[(ends[chosen] - 3)[:, None] + np.arange(3)])
+            carried.lines.add(connectivity[(ends[chosen] - 3)[:, None] + np.arange(3)], numbers[chosen])
         else:
             owner = np.repeat(np.arange(len(ends)), sizes)
             within = (owner[1:] == owner[:-1]) & (types[owner[1:]] == cell_type)
             start = np.flatnonzero(within)
-            carried.lines.append(np.stack([connectivity[start], connectivity[start + 1]], axis=1))
+            carried.lines.add(np.stack([connectivity[start], connectivity[start + 1]], axis=1), numbers[owner[start]])
 
 
 def _add_surface_cells(cells: SurfaceCells, cell_type: int, nodes: Integers, source: Integers) -> None:
