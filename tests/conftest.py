@@ -24,6 +24,7 @@ hypothesis.settings.register_profile("dev", deadline=None, max_examples=15)
 hypothesis.settings.load_profile(os.environ.get("HYPOTHESIS_PROFILE") or ("ci" if os.environ.get("CI") else "dev"))
 
 CLI = [sys.executable, "-m", "anisomesh"]
+MOST_SECONDS = 8.0  # of processor time, with subprocesses; the summary names tests above it, see CONTRIBUTING.md
 
 
 def pytest_sessionstart(session: pytest.Session) -> None:
@@ -36,6 +37,35 @@ def pytest_sessionstart(session: pytest.Session) -> None:
             programs = [subprocess.Popen([*command, part]) for part in ("first", "second")]
             for program in programs:
                 program.wait()
+
+
+@pytest.hookimpl(wrapper=True)
+def pytest_runtest_call(item: pytest.Item) -> Iterator[None]:
+    """Record the processor time of a test, which depends less on what else runs than the time on the clock."""
+    start = _processor_seconds()
+    try:
+        return (yield)
+    finally:
+        item.user_properties.append(("processor seconds", _processor_seconds() - start))
+
+
+def _processor_seconds() -> float:
+    times = os.times()
+    return times.user + times.system + times.children_user + times.children_system
+
+
+def pytest_terminal_summary(terminalreporter: pytest.TerminalReporter) -> None:
+    """Name the tests that take more processor time than a test should."""
+    seconds = {
+        report.nodeid: dict(report.user_properties).get("processor seconds", 0.0)
+        for report in terminalreporter.getreports("passed")
+        if report.when == "call"
+    }
+    dear = sorted((name for name in seconds if seconds[name] > MOST_SECONDS), key=lambda name: -seconds[name])
+    if dear:
+        terminalreporter.section(f"tests that took more than {MOST_SECONDS:g} s of processor time")
+        for name in dear:
+            terminalreporter.line(f"{seconds[name]:6.1f} s  {name}")
 
 
 def examples(number: int) -> hypothesis.settings:
@@ -151,7 +181,7 @@ def item_folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
     for seed, split in enumerate(("training", "validation")):
         name, items = f"blobs-{seed}", []
         shape = Blobs.random(np.random.default_rng(seed))
-        for entry in items_of_blobs(shape, Recipe(target=300), np.random.default_rng(seed), remesh):
+        for entry in items_of_blobs(shape, Recipe(target=150), np.random.default_rng(seed), remesh):
             items.append({"file": f"{name}.{entry.kind}.npz", "kind": entry.kind})
             save_item(entry.item, folder / items[-1]["file"])
         row = {"name": name, "family": str(seed), "split": split, "fingerprint": "", "status": "kept", "items": items}
