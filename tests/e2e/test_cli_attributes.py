@@ -36,6 +36,7 @@ def test_regions_keep_names_and_places(run_cli, tmp_path, caplog, source, target
     assert right["right half"] == pytest.approx(total, rel=0.02)
 
 
+@pytest.mark.slow
 def test_data_textures_and_one_warning(run_cli, tmp_path):
     """Data are linear on the flat sides of a plate, where interpolation is exact."""
     axis = np.abs(PLATE.face_normals).argmax(axis=1)

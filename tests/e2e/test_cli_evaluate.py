@@ -25,6 +25,7 @@ def test_text_names_every_group_of_figures(run_cli, files):
     assert "100.0%" in done.stdout
 
 
+@pytest.mark.slow
 def test_json_is_strict_and_complete(run_cli, files):
     done = run_cli("evaluate", files / "reference.ply", files / "ball.off", "--samples", 200, "--json")
     facts = json.loads(done.stdout, parse_constant=pytest.fail)

@@ -41,6 +41,7 @@ def test_bad_formats_and_streams():
         load(io.StringIO("OFF"), file_format="off")
 
 
+@pytest.mark.slow
 def test_a_pipe(tmp_path):
     """Nothing but the mesh goes to standard output."""
     save(TORUS, tmp_path / "torus.off")

@@ -236,6 +236,7 @@ def test_a_wrong_tensor_is_named_by_the_point_of_the_input():
         anisomesh.remesh(surface, n_vertices=40, density=np.where(np.arange(surface.n_points) == 10, 0.0, 1.0))
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("faults", "intersections", "used"), [([2, 0], 0, 6), ([2, 1, 1], 0, 6), ([2, 3, 1], 0, 7), ([2], 1, 5)]
 )

@@ -68,6 +68,7 @@ def test_data_and_textures_of_a_part_are_exact(divided_box):
     assert 0.0 < result.seconds["attributes"] < 0.5 * result.seconds["total"]
 
 
+@pytest.mark.slow
 def test_without_regions_no_edge_is_held_and_without_attributes_nothing_is_carried(divided_box):
     mesh, _ = divided_box
     plain = anisomesh.remesh(BOX, n_vertices=150)
@@ -107,6 +108,7 @@ def test_faces_that_the_repair_reverses_keep_what_they_carry(divided_box):
     np.testing.assert_allclose(result.mesh.corner_data["uv"], atlas(result.surface), atol=1e-9)
 
 
+@pytest.mark.slow
 def test_borders_on_a_scan_are_kept_and_cost_little():
     ball = sphere(4)
     height = ball.points[ball.faces].mean(axis=1) @ [0.0, 0.6, 0.8]
@@ -121,6 +123,7 @@ def test_borders_on_a_scan_are_kept_and_cost_little():
     assert stretch[0] < 1.1 * stretch[1]
 
 
+@pytest.mark.slow
 def test_a_texture_looks_the_same_across_its_seam():
     ball = sphere(4)
     corners = ball.points[ball.faces]
@@ -165,6 +168,7 @@ def test_borders_that_take_too_many_vertices_are_given_up():
     assert any(text.startswith("edges do not follow all borders between regions") for text in result.warnings)
 
 
+@pytest.mark.slow
 def test_the_search_for_a_distance_carries_attributes():
     mesh = Mesh(surface=BOX, regions={"side": Regions(sides_of(BOX))})
     result = anisomesh.remesh(mesh, max_error=1e-3)

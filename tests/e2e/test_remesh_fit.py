@@ -1,5 +1,7 @@
 """The fit at the end of a remesh: nearer to the input, better triangles, as valid as without it."""
 
+from functools import cache
+
 import numpy as np
 import pytest
 
@@ -15,12 +17,20 @@ SHAPES = {
 }
 
 
-@pytest.mark.parametrize("name", SHAPES)
-def test_a_fit_lowers_the_error_and_improves_triangles(name):
+@cache
+def remeshed(name, **options):
+    """Return the remesh of a shape and its evaluation."""
     make, n = SHAPES[name]
     shape = make()
-    plain, fitted = (anisomesh.remesh(shape, n_vertices=n, embedding="direct", fit=fit) for fit in (False, True))
-    before, after = (anisomesh.evaluate(shape, result.surface, samples=20_000) for result in (plain, fitted))
+    result = anisomesh.remesh(shape, n_vertices=n, embedding="direct", **options)
+    return result, anisomesh.evaluate(shape, result.surface, samples=20_000)
+
+
+@pytest.mark.parametrize(
+    "name", [name if name == "part" else pytest.param(name, marks=pytest.mark.slow) for name in SHAPES]
+)
+def test_a_fit_lowers_the_error_and_improves_triangles(name):
+    (plain, before), (fitted, after), n = remeshed(name, fit=False), remeshed(name), SHAPES[name][1]
     assert after.distance.rms < 0.85 * before.distance.rms
     assert after.shape.g_mean > before.shape.g_mean
     assert after.features.crease_covered >= before.features.crease_covered - 0.01
@@ -45,12 +55,11 @@ def test_prescribed_edges_stay_on_their_lines():
     assert covered == pytest.approx(whole, rel=1e-6)
 
 
+@pytest.mark.slow
 def test_the_weight_of_the_shape_trades_distance_for_quality():
-    shape = shapes.open_patch(lambda x, y: 0.3 * np.sin(4 * x) * y, n=40)
-    results = [
-        anisomesh.remesh(shape, n_vertices=150, embedding="direct", shape_weight=weight) for weight in (0.1, 1.0, 10.0)
-    ]
-    found = [anisomesh.evaluate(shape, result.surface, samples=20_000) for result in results]
+    assert anisomesh.RemeshOptions().shape_weight == 1.0
+    weights = ({"shape_weight": 0.1}, {}, {"shape_weight": 10.0})
+    found = [remeshed("open patch", **weight)[1] for weight in weights]
     assert found[0].distance.rms < found[1].distance.rms < found[2].distance.rms
     assert found[0].shape.g_mean < found[2].shape.g_mean
 
@@ -70,17 +79,11 @@ def test_another_value_of_fit_is_refused(fit):
 @pytest.mark.slow
 @pytest.mark.parametrize("name", ["ellipsoid", "part"])
 def test_the_metric_for_the_least_distance_is_nearer(name):
-    make, n = SHAPES[name]
-    shape = make()
-    rms = [
-        anisomesh.evaluate(
-            shape, anisomesh.remesh(shape, n_vertices=n, embedding="direct", metric=metric).surface, samples=20_000
-        ).distance.rms
-        for metric in ("curvature", "approximation")
-    ]
+    rms = [found.distance.rms for _, found in (remeshed(name), remeshed(name, metric="approximation"))]
     assert rms[1] < 0.95 * rms[0] + 1e-9
 
 
+@pytest.mark.slow
 def test_parts_are_about_as_near_as_by_quadric_decimation_with_better_triangles():
     part = cad_part(12)
     result = anisomesh.remesh(part, n_vertices=300, metric="approximation")

@@ -119,6 +119,7 @@ def test_a_line_on_a_plane_is_followed_exactly():
     assert new.n_points == 70
 
 
+@pytest.mark.slow
 def test_a_distance_is_not_reached_by_a_mesh_that_drops_the_named_edges():
     """Regression: on a plane four vertices are within any distance, but follow no curve."""
     surface = open_patch(lambda x, y: 0.0 * x, n=20)

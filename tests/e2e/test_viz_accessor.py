@@ -40,6 +40,7 @@ def test_other_targets_and_grids(ball):
     assert ball.cast_to_unstructured_grid().anisomesh.remesh(50, **FEW).n_points == 50
 
 
+@pytest.mark.slow
 def test_errors_and_warnings_are_those_of_a_remesh(ball, caplog):
     with pytest.raises(anisomesh.OptionError, match="give one of n_vertices, ratio, max_error and edge_length"):
         ball.anisomesh.remesh()

@@ -17,7 +17,7 @@ from anisomesh.mesh.surface import Surface
 
 pytestmark = pytest.mark.slow
 
-CASES = 1_100  # of each kind of file
+CASES = 500  # of each kind of file
 MOST_BYTES = 8 * 2**20  # more than any of these files has a right to
 MOST_SECONDS = 2.0
 

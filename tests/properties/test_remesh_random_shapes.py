@@ -1,10 +1,12 @@
 """Valid meshes from random difficult shapes, at any number of vertices."""
 
+from unittest import mock
+
 import hypothesis
 import numpy as np
 import pytest
 from hypothesis import strategies as st
-from random_shapes import SHAPES
+from random_shapes import SHAPES, nearly_touching
 
 from anisomesh.mesh import topology
 from anisomesh.pipeline import remesh
@@ -12,6 +14,7 @@ from anisomesh.repair.prepare import prepare
 from conftest import examples
 
 pytestmark = pytest.mark.slow
+MOST_VERTICES = {nearly_touching: 25}  # the repair of a hundred takes half a minute
 
 
 @pytest.mark.parametrize("make", SHAPES)
@@ -20,9 +23,11 @@ pytestmark = pytest.mark.slow
     seed=st.integers(0, 2**32 - 1), size=st.floats(0.7, 2.1), embedding=st.sampled_from(["direct", "hybrid"])
 )
 def test_topology_holds_and_remaining_faults_are_reported(make, seed, size, embedding):
+    """From one start, so that more faults are left to report than with the tries of other seeds."""
     surface = make(np.random.default_rng(seed))
-    n = max(4, round(10**size))
-    result = remesh(surface, n_vertices=n, seed=seed, embedding=embedding, max_iterations=15)
+    n = min(max(4, round(10**size)), MOST_VERTICES.get(make, 126))
+    with mock.patch("anisomesh.pipeline.MAX_STARTS", 1):
+        result = remesh(surface, n_vertices=n, seed=seed, embedding=embedding, max_iterations=15)
     new, old = result.surface, prepare(surface).surface
     assert topology.count_nonmanifold_edges(new.faces) == 0
     assert topology.count_nonmanifold_points(new.faces) == 0

@@ -55,6 +55,7 @@ def test_the_option():
         RemeshOptions(weld_tolerance="wide")
 
 
+@pytest.mark.slow
 def test_hint_and_option_of_the_command_line(run_cli, tmp_path):
     """Regression: nothing told why a soup with cracks came back as separate triangles, and nothing could join them."""
     soup = cracked(0.4 * AUTO_WELD)
