@@ -108,8 +108,8 @@ def test_what_the_file_carries_is_listed(run_cli, facts, tmp_path):
         "count (int32)",
         f"{len(line)} edges of length 1",
         "2 points",
-        "physical: 1 (rim)",
-        "physical: 1 (probe)",
+        "physical: 1 (rim = 1)",
+        "physical: 1 (probe = 8)",
     ):
         assert words in text
 

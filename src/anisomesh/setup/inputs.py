@@ -35,7 +35,7 @@ _MAX_MEAN_DISTANCE = 0.05  # of the input from the surface of a solution, over t
 _LARGEST_DENSITY = 1e30  # and inverse of the smallest, so that energies are far from overflow
 
 
-class Lines(NamedTuple):
+class FollowedLines(NamedTuple):
     """Edges (E,) that are prescribed, on smooth borders between regions, and on smooth seams of corner data."""
 
     tagged: EdgeMask
@@ -188,7 +188,7 @@ def prepared_input(mesh: Mesh, options: RemeshOptions, *, joined: bool = True) -
         fixed = (fixed[junctions.source] & ~junctions.added) | junctions.graph.nodes
         prepared = replace(prepared, surface=sheets, point_source=source, junctions=none)
         inside = sheets.edge_face_count == 2  # junctions are boundaries, and followed as such
-        lines = Lines(*(edges & inside for edges in _lines(mesh, prepared, options)))
+        lines = FollowedLines(*(edges & inside for edges in _lines(mesh, prepared, options)))
     tensors = density = None
     if options.has_tensors:
         given = _at_prepared("metric", options.metric, (surface.n_points, 3, 3), prepared, MetricError)
@@ -243,11 +243,11 @@ def _solution(metric: SolutionMetric, surface: Surface, prepared: Prepared) -> S
     return replace(metric, values=checked_values(metric.values)[own.point_source], surface=own.surface)
 
 
-def _lines(mesh: Mesh, prepared: Prepared, options: RemeshOptions) -> Lines:
+def _lines(mesh: Mesh, prepared: Prepared, options: RemeshOptions) -> FollowedLines:
     """Return the lines on a prepared surface that the edges of the result are to follow."""
     prescribed = [mesh.features, *([] if options.features is None else [options.features])]
     tagged = _tagged(prescribed, mesh.surface, prepared.surface, options)
-    return Lines(tagged, *_borders(with_split_sides(mesh, prepared.report, options), prepared.surface, options))
+    return FollowedLines(tagged, *_borders(with_split_sides(mesh, prepared.report, options), prepared.surface, options))
 
 
 def _ends(surface: Surface, edges: EdgeMask) -> PointMask:
