@@ -141,3 +141,17 @@ def test_sheets_are_joined_beside_locked_faces_and_to_them(name, lock):
         for each in (surface.points[surface.faces[mask]], result.surface.points[result.surface.faces])
     )
     assert before <= after
+
+
+def test_a_locked_face_whose_side_is_split_at_a_junction_is_said_not_to_be_locked():
+    """The edge at which two cubes meet gets a point in its middle, so the four faces there change."""
+    surface = Surface(*SHAPES["cubes_at_an_edge"]())
+    result = anisomesh.remesh(surface, n_vertices=40, lock=np.arange(surface.n_faces) < 12, threads=1, max_iterations=5)
+    before, after = (
+        {tuple(sorted(map(tuple, corners))) for corners in each.tolist()}
+        for each in (surface.points[surface.faces[:12]], result.surface.points[result.surface.faces])
+    )
+    lost = len(before - after)
+    assert 0 < lost < 12
+    assert f"{lost} of 12 locked faces were changed by the repair and are not locked" in result.warnings
+    assert result.validity.nonmanifold_edges > 0

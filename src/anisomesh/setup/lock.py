@@ -23,7 +23,6 @@ from anisomesh.meshops.inverted import remove_inverted_triangles
 from anisomesh.meshops.self_intersections import remove_self_intersections
 from anisomesh.options import RemeshOptions
 from anisomesh.repair.near_points import weld_distance
-from anisomesh.repair.prepare import Prepared
 from anisomesh.setup.inputs import PreparedInput
 from anisomesh.setup.rest import rest_of
 from anisomesh.setup.selection import selected_faces
@@ -204,7 +203,7 @@ def cut_locked(whole: PreparedInput, mesh: Mesh, options: RemeshOptions) -> Cut:
     surface, weld = whole.prepared.surface, weld_distance(mesh.surface, options.weld_tolerance)
     locked, face_source, lost = np.zeros(surface.n_faces, dtype=bool), np.zeros(0, dtype=np.int64), 0
     if chosen.any():
-        locked, face_source = _found(whole.prepared, mesh, np.flatnonzero(chosen), weld)
+        locked, face_source = _found(whole, mesh, np.flatnonzero(chosen), weld)
         lost = int(np.count_nonzero(chosen)) - len(np.unique(face_source))
         if not locked.any():
             raise OptionError("lock has only faces that the repair of the mesh changes; lock others")
@@ -228,11 +227,14 @@ def cut_locked(whole: PreparedInput, mesh: Mesh, options: RemeshOptions) -> Cut:
     )
 
 
-def _found(prepared: Prepared, mesh: Mesh, wanted: Ints, weld: float) -> tuple[FaceMask, Ints]:
+def _found(whole: PreparedInput, mesh: Mesh, wanted: Ints, weld: float) -> tuple[FaceMask, Ints]:
     """Return which prepared faces (F,) are some faces (n,) of the mesh, and for each of them (m,) which one."""
     label = Joints(mesh.surface, weld).place
     known, first = np.unique(np.sort(label[mesh.surface.faces[wanted]], axis=1), axis=0, return_index=True)
-    row = _rows_found(np.sort(label[prepared.point_source[prepared.surface.faces]], axis=1), known)
+    faces, source = whole.prepared.surface.faces, whole.prepared.point_source
+    row = _rows_found(np.sort(label[source[faces]], axis=1), known)
+    if whole.junctions is not None:  # points that were added have no source of their own
+        row[whole.junctions.added[faces].any(axis=1)] = -1
     return row >= 0, wanted[first[row[row >= 0]]].astype(np.int64)
 
 

@@ -110,7 +110,7 @@ def load_field(spec: str | os.PathLike[str], kinds: Collection[FieldKind] = ("sc
     layout = "XX YY ZZ XY YZ XZ" if values.shape[1:] == (6,) else "row by row" if kind == "tensor" else ""
     if path.suffix.lower() == ".sol" and kind == "tensor":
         planar = sol_dimension(path.read_bytes()) == PLANE
-        layout = "m11 m12 m22, and their mean for m33" if planar else "m11 m12 m22 m13 m23 m33"
+        layout = "m11 m12 m22, and for m33 the mean of m11 and m22" if planar else "m11 m12 m22 m13 m23 m33"
     return PointField(path=path, name=name, kind=kind, values=_rows(values, kind), points=points, layout=layout)
 
 
