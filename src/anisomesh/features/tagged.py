@@ -45,7 +45,7 @@ def tagged_edges(
     Repair merges and duplicates points, so the ends of the edges are found again by their positions. It splits edges at
     points that lie on them, so the edges along one that is gone are its parts.
     """
-    ends = _checked_pairs(input_mesh, pairs)
+    ends = checked_pairs(input_mesh, pairs)
     tree = cKDTree(prepared.points)
     keys = edge_keys(prepared.edges)
     radius = search_radius(input_mesh, tolerance)
@@ -89,7 +89,7 @@ def search_radius(input_mesh: Surface, tolerance: float | Literal["auto"]) -> fl
     return max(weld_distance(input_mesh, tolerance), _MIN_SEARCH_RADIUS * input_mesh.diagonal)
 
 
-def _checked_pairs(input_mesh: Surface, pairs: npt.ArrayLike) -> npt.NDArray[np.int64]:
+def checked_pairs(input_mesh: Surface, pairs: npt.ArrayLike) -> npt.NDArray[np.int64]:
     """Return the pairs as integers (n, 2) after validation."""
     try:
         values: npt.NDArray[Any] = np.asarray(pairs)

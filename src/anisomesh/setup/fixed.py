@@ -9,15 +9,16 @@ import numpy as np
 import numpy.typing as npt
 from scipy.spatial import cKDTree
 
-from anisomesh._arrays import PointMask
+from anisomesh._arrays import EdgeEnds, PointMask
 from anisomesh.attributes.model import Ints, Mesh
 from anisomesh.errors import OptionError
-from anisomesh.features.tagged import search_radius
+from anisomesh.features.tagged import checked_pairs, search_radius
+from anisomesh.mesh.surface import Surface
 from anisomesh.options import RemeshOptions
 from anisomesh.repair.prepare import Prepared
 
-_FEW_ENDS = 64  # of regions of features that are fixed in any case; heuristic
-_MAX_END_SHARE = 0.5  # of the points on features, if there are more; heuristic
+_FEW_ENDS = 64  # of lines that are fixed in any case; heuristic
+_MAX_END_SHARE = 0.5  # of the points on lines, if there are more; heuristic
 
 
 def with_fixed_points(mesh: Mesh, prepared: Prepared, options: RemeshOptions) -> tuple[Prepared, PointMask]:
@@ -30,11 +31,15 @@ def with_fixed_points(mesh: Mesh, prepared: Prepared, options: RemeshOptions) ->
 
     Notes
     -----
-    Repair merges and copies points, so they are found again by their positions, all copies of each. Ends of regions of
-    features, such as physical curves, are fixed like the fixed points of the mesh, unless borders are not followed.
+    Repair merges and copies points, so they are found again by their positions, all copies of each. Ends of prescribed
+    lines are fixed like the fixed points of the mesh, and so are ends of their regions, such as physical curves, unless
+    borders are not followed.
     """
     asked = checked_points("keep_points", options.keep_points, mesh.surface.n_points)
-    ends = curve_ends(mesh) if options.attributes and options.regions else asked[:0]
+    more = checked_pairs(mesh.surface, [] if options.features is None else options.features)
+    ends = line_ends(mesh.surface, np.concatenate([mesh.features, more]))
+    if options.attributes and options.regions:
+        ends = np.union1d(ends, curve_ends(mesh))
     wanted = np.concatenate([asked, mesh.fixed_points, ends])
     fixed = np.zeros(prepared.surface.n_points, dtype=bool)
     if len(wanted) == 0:
@@ -67,13 +72,16 @@ def with_fixed_points(mesh: Mesh, prepared: Prepared, options: RemeshOptions) ->
     return replace(prepared, surface=prepared.surface.with_points(points)), fixed
 
 
-def curve_ends(mesh: Mesh) -> Ints:
-    """Return the points (n,) at which a region of the features of a mesh ends or branches.
+def line_ends(surface: Surface, edges: EdgeEnds) -> Ints:
+    """Return the points (n,) of a surface at which one of some edges (m, 2) ends, and no other one."""
+    points, place = _places(surface, edges)
+    pairs = np.unique(np.sort(place.reshape(-1, 2), axis=1), axis=0)
+    return _few(points, place, (np.bincount(pairs.ravel(), minlength=1) == 1)[place])
 
-    There are none if regions end at most points on them, since their labels then number edges and not curves.
-    """
-    points = mesh.features.ravel()
-    place = np.unique(mesh.surface.points[points], axis=0, return_inverse=True)[1].reshape(-1)
+
+def curve_ends(mesh: Mesh) -> Ints:
+    """Return the points (n,) at which a region of the features of a mesh ends or branches."""
+    points, place = _places(mesh.surface, mesh.features)
     is_end = np.zeros(len(points), dtype=bool)
     for regions in mesh.feature_regions.values():
         label = np.repeat(regions.labels, 2)
@@ -81,8 +89,19 @@ def curve_ends(mesh: Mesh) -> Ints:
             np.stack([place, label], axis=1), axis=0, return_inverse=True, return_counts=True
         )
         is_end |= ((count != 2) & (pairs[:, 1] != 0))[number.reshape(-1)]
-    ends, n_points = np.unique(place[is_end], return_index=True)[1], len(np.unique(place))
-    if len(ends) > max(_FEW_ENDS, _MAX_END_SHARE * n_points):
+    return _few(points, place, is_end)
+
+
+def _places(surface: Surface, edges: EdgeEnds) -> tuple[Ints, Ints]:
+    """Return the point at each end of edges (2 m,), and the number of its place."""
+    points = edges.ravel().astype(np.int64)
+    return points, np.unique(surface.points[points], axis=0, return_inverse=True)[1].reshape(-1)
+
+
+def _few(points: Ints, place: Ints, is_end: PointMask) -> Ints:
+    """Return the points (n,) of ends, one at each place; none if most places are ends: these are edges and no lines."""
+    ends, n_places = np.unique(place[is_end], return_index=True)[1], len(np.unique(place))
+    if len(ends) > max(_FEW_ENDS, _MAX_END_SHARE * n_places):
         return points[:0]
     return np.asarray(points[is_end][ends], dtype=np.int64)
 

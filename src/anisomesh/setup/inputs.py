@@ -176,7 +176,6 @@ def prepared_input(mesh: Mesh, options: RemeshOptions, *, joined: bool = True) -
     surface = mesh.surface
     prepared, fixed = with_fixed_points(mesh, prepare(surface, weld_tolerance=options.weld_tolerance), options)
     least, junctions, lines = int(np.count_nonzero(fixed)), None, _lines(mesh, prepared, options)
-    fixed = fixed | _ends(prepared.surface, lines.tagged)
     if joined and prepared.junctions.any():
         followed = lines.tagged | lines.borders | lines.seams
         crossing = np.zeros_like(fixed)
@@ -248,11 +247,6 @@ def _lines(mesh: Mesh, prepared: Prepared, options: RemeshOptions) -> FollowedLi
     prescribed = [mesh.features, *([] if options.features is None else [options.features])]
     tagged = _tagged(prescribed, mesh.surface, prepared.surface, options)
     return FollowedLines(tagged, *_borders(with_split_sides(mesh, prepared.report, options), prepared.surface, options))
-
-
-def _ends(surface: Surface, edges: EdgeMask) -> PointMask:
-    """Return at which points (V,) exactly one of some edges (E,) ends."""
-    return np.asarray(np.bincount(surface.edges[edges].ravel(), minlength=surface.n_points) == 1)
 
 
 def _tagged(
