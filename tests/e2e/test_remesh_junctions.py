@@ -155,3 +155,15 @@ def test_a_locked_face_whose_side_is_split_at_a_junction_is_said_not_to_be_locke
     assert 0 < lost < 12
     assert f"{lost} of 12 locked faces were changed by the repair and are not locked" in result.warnings
     assert result.validity.nonmanifold_edges > 0
+
+
+@pytest.mark.parametrize("how", [{"n_vertices": 150}, {"max_error": 0.01}])
+def test_a_prescribed_line_across_a_junction_is_followed(how):
+    surface = Surface(*SHAPES["tee"]())
+    on_line = (surface.points[:, 1] == 0.0) & (surface.points[:, 2] == 0.0)
+    edges = surface.edges[on_line[surface.edges].all(axis=1)]
+    result = anisomesh.remesh(Mesh(surface=surface, features=edges), embedding="direct", threads=1, **how)
+    assert result.warnings == ()
+    assert result.feature_distance < 1e-12
+    ends = result.mesh.surface.points[result.mesh.features]
+    assert np.linalg.norm(ends[:, 1] - ends[:, 0], axis=1).sum() == pytest.approx(2.0, rel=1e-12)

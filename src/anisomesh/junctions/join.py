@@ -13,6 +13,7 @@ from anisomesh.delaunay.feature_mesh import edges_left, renumbered
 from anisomesh.delaunay.meshing import MeshingTask, ValidMesh
 from anisomesh.junctions.chains import Bundled, bundled
 from anisomesh.junctions.cut import Junctions
+from anisomesh.junctions.line_ends import with_ends_at_nodes
 from anisomesh.junctions.narrow import place_beside, without_narrow_faces
 from anisomesh.junctions.seam import Seam, seam_along
 from anisomesh.mesh.geometry import Frame, even_edge_length
@@ -102,7 +103,11 @@ class JoinTask:
         found = without_narrow_faces(found, task.reference)
         made = conform(found.points, found.faces, found.bundles)
         seam = seam_along(made.points, made.chains)
-        tidy = _tidied(replace(mesh, points=made.points, faces=made.faces), task)
+        nodes = np.unique(np.concatenate([table[:, [0, -1]].ravel() for table in made.chains]))
+        working = task.voronoi.embedded.surface
+        lines = working.points[working.edges[task.features.required & (working.edge_face_count == 2)]]
+        faces, creases = with_ends_at_nodes(made.points, made.faces, mesh.crease_edges, nodes, lines, task.reference)
+        tidy = _tidied(replace(mesh, points=made.points, faces=faces, crease_edges=creases), task)
         settled = _settled(Conforming(tidy, seam), task, self.n_vertices)
         if settled is None or seam.join(Surface(settled.points, settled.faces)) is None:
             return None
