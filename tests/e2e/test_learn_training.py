@@ -334,7 +334,7 @@ def test_wrong_configurations_say_what_is_meant(tmp_path, text, words):
     (tmp_path / "a.toml").write_text(text)
     with pytest.raises(OptionError, match=words):
         load_training(tmp_path / "a.toml")
-    with pytest.raises(OptionError, match="cannot be read"):
+    with pytest.raises(OptionError, match="no such file; expected a TOML file"):
         load_training(tmp_path / "none.toml")
 
 

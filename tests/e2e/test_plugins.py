@@ -91,7 +91,7 @@ def test_triangles_are_smaller_where_the_density_is_larger():
 @pytest.mark.parametrize(
     ("options", "message"),
     [
-        ({"density": np.ones(3)}, "density has shape"),
+        ({"density": np.ones(3)}, "density has 3 values; expected"),
         ({"density": -np.ones(SURFACE.n_points)}, "positive"),
         ({"energy": 7.0}, "expected an object with evaluate"),
         ({"energy": NormalMetric(3.0), "sharpness": 5.0}, "sharpness belongs to the built-in energy"),

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 import anisomesh
-from anisomesh import pipeline
+from anisomesh import starts
 from anisomesh.errors import MeshError, MeshFileError, MetricError, OptionError
 from anisomesh.mesh.distance import surface_distance
 from anisomesh.mesh.surface import Surface
@@ -244,12 +244,12 @@ def test_other_seeds_are_tried_while_a_mesh_has_faults_that_the_input_does_not_e
     ring, monkeypatch, faults, intersections, used
 ):
     """The best of three is the mesh of its seed, and its stages took the time of all."""
-    check, left = pipeline.check_validity, list(faults)
+    check, left = starts.check_validity, list(faults)
 
-    def faulty(mesh, reference):
-        return replace(check(mesh, reference), inverted=left.pop(0), self_intersections_input=intersections)
+    def faulty(*surfaces):
+        return replace(check(*surfaces), inverted=left.pop(0), self_intersections_input=intersections)
 
-    monkeypatch.setattr(pipeline, "check_validity", faulty)
+    monkeypatch.setattr(starts, "check_validity", faulty)
     options = {"n_vertices": 60, "embedding": "direct", **FEW}
     result = anisomesh.remesh(ring, seed=5, **options)
     assert (left, result.seed, result.report()["seed"]) == ([], used, used)
