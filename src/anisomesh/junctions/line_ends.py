@@ -12,7 +12,7 @@ from anisomesh.mesh.surface import Surface
 from anisomesh.mesh.topology import edge_keys
 from anisomesh.meshops.edge_recovery import recover_edges
 
-_MAX_STEPS = 3  # edges between a node and the last vertex of a line that ends there
+_MAX_EDGES_BETWEEN = 3  # edges between a node and the last vertex of a line that ends there
 _MAX_SAG = 0.1  # of the length of an edge, from its middle to the line that it follows
 
 Ints = npt.NDArray[np.int64]
@@ -74,7 +74,7 @@ def _around(surface: Surface, point: int) -> PointMask:
     """Return which points (V,) are few edges away from a point."""
     near = np.zeros(surface.n_points, dtype=bool)
     near[point] = True
-    for _ in range(_MAX_STEPS):
+    for _ in range(_MAX_EDGES_BETWEEN):
         near[surface.edges[near[surface.edges].any(axis=1)]] = True
     return near
 
