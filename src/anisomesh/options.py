@@ -25,7 +25,6 @@ EmbeddingName = Literal["auto", "direct", "filtered", "neural", "hybrid"]
 DeviceName = Literal["cpu", "cuda"]
 MAX_THREADS = 1024
 MIN_VERTICES = 4  # a tetrahedron
-_LARGEST_RATIO = 1e12  # vertices per vertex of the input; more is a mistake
 _NUMBERS = ("sharpness", "feature_angle", "weld_tolerance", "shape_weight")
 _SIZES = ("edge_length", "min_size", "max_size", "gradation")
 _OPTIONAL_NUMBERS = ("final_sharpness", "time_limit", *_SIZES)
@@ -278,30 +277,3 @@ def with_overrides(options: Any, overrides: dict[str, Any]) -> RemeshOptions:
             remedy = hint(name, names) or f"; expected one of {', '.join(names)}"
             raise OptionError(f"remesh has no option {name!r}{remedy}")
     return replace(options, **overrides)
-
-
-def read_target(
-    n_vertices: object, ratio: object, max_error: object, options: RemeshOptions
-) -> tuple[int | None, float | None, float | None]:
-    """Return the one of the three that is given, as a number in range, and None for the others.
-
-    All are None if the options have an edge length, or a size field or tensors and none is given.
-    """
-    given = sum(value is not None for value in (n_vertices, ratio, max_error))
-    if given + (options.edge_length is not None) > 1 or not (given or options.absolute_length is not None):
-        raise OptionError("give one of n_vertices, ratio, max_error and edge_length")
-    if not given:
-        if options.density is not None:
-            raise OptionError("a density has no unit; give n_vertices or ratio beside it")
-        return None, None, None
-    if n_vertices is not None:
-        return whole_number("n_vertices", n_vertices, MIN_VERTICES), None, None
-    if max_error is not None:
-        length = real_number("max_error", max_error)
-        if not (math.isfinite(length) and length > 0.0):
-            raise OptionError(f"max_error = {length}; expected a positive length in model units")
-        return None, None, length
-    share = real_number("ratio", ratio)
-    if not 0.0 < share <= _LARGEST_RATIO:
-        raise OptionError(f"ratio = {share}; expected a positive number, such as 0.2 for a fifth of the vertices")
-    return None, share, None

@@ -23,6 +23,7 @@ from anisomesh.caveats import (
     unused_metric,
 )
 from anisomesh.counts.search import smallest_within
+from anisomesh.counts.target import read_target
 from anisomesh.delaunay.meshing import ValidMesh
 from anisomesh.errors import OptionError
 from anisomesh.execution.deadline import Deadline
@@ -33,14 +34,14 @@ from anisomesh.junctions.join import JoinTask, sites_for
 from anisomesh.mesh.surface import Surface
 from anisomesh.metric.conformity import Conformity, MetricExtent, conformity
 from anisomesh.metric.unit_edges import UnitMetric
-from anisomesh.options import MIN_VERTICES, RemeshOptions, read_target, with_overrides
+from anisomesh.options import MIN_VERTICES, RemeshOptions, with_overrides
 from anisomesh.resolve import embedding_name
 from anisomesh.result import RemeshResult
 from anisomesh.setup.inputs import prepared_input, with_split_sides
 from anisomesh.setup.lock import Cut, cut_locked
 from anisomesh.setup.measured import count_for_length, unit_of_lengths
 from anisomesh.setup.tasks import Tasks, set_up
-from anisomesh.starts import MeshTask, valid_mesh
+from anisomesh.starts import MadeMesh, MeshTask, valid_mesh
 
 logger = logging.getLogger(__name__)
 
@@ -225,15 +226,7 @@ def _remesh(
         warnings=(
             *losses_of_repair(prepared.report, joined=is_joined),
             *cut.remarks,
-            *measured.remarks,
-            *field.remarks,
-            *losses_of_shape(
-                measured.surface,
-                Surface(mesh.points, mesh.faces),
-                task.corner_places,
-                made.feature_distance,
-                measured.followed,
-            ),
+            *_said_of_mesh(made, tasks),
             *caveats(n, field.noise, replace(mesh, points=surface.points), validity, optimised, measured.options),
             *(() if agreement is None else unfollowed_sizes(agreement)),
         ),
@@ -246,6 +239,14 @@ def _remesh(
         ),
         feature_distance=made.feature_distance * frame.scale,
     )
+
+
+def _said_of_mesh(made: MadeMesh, tasks: Tasks) -> tuple[str, ...]:
+    """Return what a user should know of the measured surface, its metric and the shape of a mesh of it."""
+    measured, mesh = tasks.measured, Surface(made.mesh.points, made.mesh.faces)
+    places, distance = tasks.dual.corner_places, made.feature_distance
+    shape = losses_of_shape(measured.surface, mesh, places, distance, measured.followed)
+    return (*measured.remarks, *measured.field.remarks, *shape)
 
 
 def _agreement(mesh: ValidMesh, tasks: Tasks, asked: float | None) -> Conformity:

@@ -180,7 +180,7 @@ def test_values_that_are_no_metric_are_refused(run, square, values, words):
         (["--metric", "curvature"], "--metric and --metric-file say what the metric is"),
         (["--edge-length", "2%"], "--edge-length 2%: in the metric of a file it is a number"),
         (["-n", 50, "--ratio", 0.1], "give one of -n"),
-        (["--min-size", "1%", "--gradation", 0.3], "--min-size and --gradation: there are no sizes to limit"),
+        (["--min-size", "1%", "--gradation", 0.3], "--min-size and --gradation: only sizes can be limited"),
         (["--max-size", "x"], "--max-size"),
         (["--save-metric", "none/m.sol"], "the folder none does not exist"),
         (["--save-metric", "m.stl"], "--save-metric m.stl: expected a file name ending in .sol, .npy, .vtu"),

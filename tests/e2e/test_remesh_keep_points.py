@@ -123,5 +123,5 @@ def test_points_that_cannot_be_kept_are_refused(given, message):
 
 def test_a_point_that_no_face_uses_cannot_be_kept():
     surface = Surface(np.concatenate([BOX.points, [[9.0, 9.0, 9.0]]]), BOX.faces)
-    with pytest.raises(OptionError, match=rf"keep_points has {BOX.n_points}, which is no point after the repair"):
+    with pytest.raises(OptionError, match=rf"keep_points has {BOX.n_points}, which the repair of the mesh removes"):
         anisomesh.remesh(surface, n_vertices=50, keep_points=[3, BOX.n_points])

@@ -160,8 +160,8 @@ def test_what_locked_faces_carry_is_the_same(lock):
 @pytest.mark.parametrize(
     ("lock", "message"),
     [
-        ("bottom", r"lock = 'bottom' is no region of the mesh; its regions are 'top', 'part 9'"),
-        (5, r"lock = 5 is no region of the mesh; .*; groups of lines or points cannot be selected"),
+        ("bottom", r"lock = 'bottom' is not a region of the mesh; its regions are 'top', 'part 9'"),
+        (5, r"lock = 5 is not a region of the mesh; .*; groups of lines or points cannot be selected"),
         (0.5, r"lock = 0.5; expected the name or label of a region"),
         (
             np.zeros(BOX.n_faces, dtype=bool),
@@ -243,7 +243,7 @@ def test_the_command_locks_regions_and_keeps_points(run_cli, tmp_path, suffix, d
         assert found == expected
     process = run_cli("remesh", f"a.{suffix}", "-o", f"c.{suffix}", "-n", 250, "--lock", "lid", cwd=tmp_path)
     assert process.returncode != 0
-    assert "'lid' is no region of the mesh; its regions are" in process.stderr
+    assert "'lid' is not a region of the mesh; its regions are" in process.stderr
 
 
 def named(mesh, division):

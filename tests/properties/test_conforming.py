@@ -18,7 +18,7 @@ def on_curve(places):
 
 
 def strips(counts, rng):
-    """Return strips beside the curve with so many vertices on it at random places, and their chains."""
+    """Return strips beside the curve with a number of vertices on it at random places, and their chains."""
     points, faces, chains, first = [], [], [], 0
     for number, count in enumerate(counts):
         places = np.concatenate([[0.0], np.sort(rng.uniform(0.0, START[-1], count - 2)), START[-1:]])

@@ -106,7 +106,7 @@ def test_an_array_of_integers_is_read_and_what_cannot_be_used_is_said_in_plain_w
     np.save(path, np.arange(1, 8))
     np.testing.assert_array_equal(load_field(path).values, np.arange(1.0, 8.0))
     for content, words in {
-        b"xxxx": "it is no array that numpy.save has written",
+        b"xxxx": "it was not written by numpy.save",
         path.read_bytes()[:-5]: "or is truncated",
     }.items():
         path.write_bytes(content)

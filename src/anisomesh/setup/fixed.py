@@ -51,7 +51,7 @@ def with_fixed_points(mesh: Mesh, prepared: Prepared, options: RemeshOptions) ->
     lost = np.flatnonzero(distance[: len(asked)] > radius)
     if len(lost):
         raise OptionError(
-            f"keep_points has {asked[lost[0]]}, which is no point after the repair of the mesh: no face with an area "
+            f"keep_points has {asked[lost[0]]}, which the repair of the mesh removes: no face with an area "
             "has it, or it was merged with points farther away; leave it out, or lower weld_tolerance"
         )
     owner = np.full(len(points), -1)

@@ -197,7 +197,7 @@ def cut_locked(whole: PreparedInput, mesh: Mesh, options: RemeshOptions) -> Cut:
     Raises
     ------
     OptionError
-        If ``lock`` is no region or mask of the mesh.
+        If ``lock`` is neither a region nor a mask of the mesh.
     """
     chosen = selected_faces("lock", mesh, options.lock)
     surface, weld = whole.prepared.surface, weld_distance(mesh.surface, options.weld_tolerance)

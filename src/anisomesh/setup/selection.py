@@ -31,7 +31,7 @@ def selected_faces(name: str, mesh: Mesh, selection: Any) -> FaceMask:
     Raises
     ------
     OptionError
-        If a mask has another length or selects nothing, or there is no such region.
+        If a mask has another length or selects nothing, or the mesh does not have the region.
     """
     chosen = np.zeros(mesh.surface.n_faces, dtype=bool)
     if selection is None:
@@ -71,7 +71,7 @@ def _faces_of(name: str, mesh: Mesh, wanted: Any) -> FaceMask:
         return _faces_of(name, mesh, int(wanted))
     if not found.any():
         raise OptionError(
-            f"{name} = {wanted!r} is no region of the mesh; {_remedy(mesh)}; groups of lines or points cannot be "
+            f"{name} = {wanted!r} is not a region of the mesh; {_remedy(mesh)}; groups of lines or points cannot be "
             "selected"
         )
     return found

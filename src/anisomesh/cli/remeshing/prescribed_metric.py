@@ -69,7 +69,7 @@ def check_limits(prescribed: MetricFile | AdaptTo | None, options: list[str]) ->
     """
     if options and not (isinstance(prescribed, MetricFile) and prescribed.field.kind == "scalar"):
         names = " and ".join(options)
-        raise typer.BadParameter(f"{names}: there are no sizes to limit; give a --metric-file with lengths of edges")
+        raise typer.BadParameter(f"{names}: only sizes can be limited; give a --metric-file with lengths of edges")
 
 
 def file_of(prescribed: MetricFile | AdaptTo | None) -> Path | None:

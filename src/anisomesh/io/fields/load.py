@@ -145,7 +145,7 @@ def _array_of(file: BinaryIO) -> Array:
     except (ValueError, EOFError) as error:
         if "Object arrays" in str(error):
             raise ValueError("it holds Python objects; expected an array of numbers") from error
-        raise ValueError("it is no array that numpy.save has written, or is truncated") from error
+        raise ValueError("it was not written by numpy.save, or is truncated") from error
 
 
 def _kind(path: Path, values: Array) -> FieldKind | None:

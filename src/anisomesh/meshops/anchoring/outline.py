@@ -137,7 +137,7 @@ def _merit(mesh: LinedMesh, change: Change, reference: ClosestPoints) -> tuple[b
 
 
 def _way_made(mesh: LinedMesh, gone: int, sides: tuple[int, int]) -> Step | None:
-    """Return the split of an edge in the way of both collapses of a point, None if there is no such edge."""
+    """Return the split of an edge in the way of both collapses of a point, None if no edge is in the way."""
     surface = mesh.surface
     for into in sides:
         triangle = surface.faces[mesh.star(gone)]
