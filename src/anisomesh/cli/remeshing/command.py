@@ -205,7 +205,7 @@ def command(
             options["weld_tolerance"] = options.pop("weld", weld)
         if prescribed is not None:
             display.note(prescribed.description)
-            options |= prescribed.options_for(mesh, str(source), options["feature_angle"])
+            options |= prescribed.options_for(mesh, str(source))
         with prescribed.named_in_errors() if isinstance(prescribed, MetricFile) else nullcontext():
             result, facts = run_remesh(mesh, display, name=str(source), load_seconds=seconds, **options)
         facts["hints"] = hints(result.prepared)

@@ -56,7 +56,7 @@ def prescribed_metric(
         return None
     if edge_length is not None or max_error is not None:
         raise typer.BadParameter("--adapt-to says where triangles are small, not how small; give -n or --ratio with it")
-    return AdaptTo.parse(adapt_to, norm or _DEFAULT_NORM)
+    return AdaptTo.parse(adapt_to, norm or _DEFAULT_NORM, context.params["feature_angle"])
 
 
 def check_limits(prescribed: MetricFile | AdaptTo | None, options: list[str]) -> None:
@@ -108,7 +108,7 @@ class MetricFile:
         """What the report says in place of the values."""
         return {"metric": None, "size_field": None, "metric_file": self.spec}
 
-    def options_for(self, mesh: Mesh, name: str, crease_angle: float) -> dict[str, Any]:
+    def options_for(self, mesh: Mesh, name: str) -> dict[str, Any]:
         """Return the options of a remesh that prescribe the field at the points of an input.
 
         Parameters
@@ -117,8 +117,6 @@ class MetricFile:
             The input as it was read.
         name
             Its name, for messages.
-        crease_angle
-            Not used: a metric is taken as it is.
 
         Raises
         ------
@@ -156,15 +154,20 @@ class MetricFile:
 
 @dataclass(frozen=True)
 class AdaptTo:
-    """A field at the points of a mesh file, None for the input, the norm of the error, and the option that names it."""
+    """A field at the points of a mesh file, None for the input, and the option that names it.
+
+    The error is to be small in the L^p norm, p being ``norm``. Edges that bend by more degrees than ``crease_angle``
+    are not looked across.
+    """
 
     file: Path | None
     field: str
     norm: float
+    crease_angle: float
     spec: str
 
     @classmethod
-    def parse(cls, spec: str, norm: str) -> AdaptTo:
+    def parse(cls, spec: str, norm: str, crease_angle: float) -> AdaptTo:
         """Return what is meant by ``FIELD`` or ``FILE:FIELD``, and a norm such as ``2`` or ``inf``.
 
         Raises
@@ -183,7 +186,7 @@ class AdaptTo:
             p = 0.0
         if not p >= 1.0:
             raise typer.BadParameter(f"--norm {norm}: expected a number of at least 1, such as 2, or inf")
-        return cls(None if field is None else path, spec if field is None else field, p, spec)
+        return cls(None if field is None else path, spec if field is None else field, p, crease_angle, spec)
 
     @property
     def description(self) -> str:
@@ -195,7 +198,7 @@ class AdaptTo:
         """What the report says in place of the values."""
         return {"metric": None, "adapt_to": self.spec, "norm": f"{self.norm:g}"}
 
-    def options_for(self, mesh: Mesh, name: str, crease_angle: float) -> dict[str, Any]:
+    def options_for(self, mesh: Mesh, name: str) -> dict[str, Any]:
         """Return the options of a remesh that adapt an input to the field.
 
         Parameters
@@ -204,8 +207,6 @@ class AdaptTo:
             The input as it was read.
         name
             Its name, for messages.
-        crease_angle
-            Edges that bend by more degrees are not looked across.
 
         Raises
         ------
@@ -227,5 +228,7 @@ class AdaptTo:
             )
         surface = None if self.file is None else given.surface
         return {
-            "metric": SolutionMetric(values.reshape(-1), surface=surface, norm=self.norm, crease_angle=crease_angle)
+            "metric": SolutionMetric(
+                values.reshape(-1), surface=surface, norm=self.norm, crease_angle=self.crease_angle
+            )
         }
