@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+from scipy.spatial.transform import Rotation
 
 from anisomesh.features.detect import sharp_edges
 from anisomesh.fitting.planes import onto_planes
@@ -12,13 +13,13 @@ from anisomesh.metric.transfer import PlacedMetric
 from anisomesh.shapes import analytic as shapes
 
 
-def samples_on(surface, count=4_000):
+def samples_on(surface, count=4_000, creases=None):
     """Return samples of a surface and the faces that they are nearest to."""
     reference = ClosestPoints(surface)
     samples = sample_surface(
         surface,
         count,
-        creases=np.zeros(len(surface.edges), dtype=bool),
+        creases=np.zeros(len(surface.edges), dtype=bool) if creases is None else creases,
         metric=PlacedMetric(reference, MetricField(tensors=np.tile(np.eye(3), (surface.n_points, 1, 1)))),
         rng=np.random.default_rng(0),
     )
@@ -39,11 +40,32 @@ def test_points_of_a_box_come_back_to_its_planes():
     assert np.sort(along, axis=1)[:, :2].max() < 1e-15  # no step within the plane
 
 
-@pytest.mark.parametrize("size", [1e-3, 1e-4])
-def test_points_farther_from_a_plane_stay(size):
+def test_points_come_back_to_planes_whose_facets_are_rounded_to_single_precision():
+    rotation = Rotation.from_euler("xyz", [0.3, 0.4, 0.5]).as_matrix()
+    exact = shapes.box(n=6).points @ rotation
+    cube = shapes.box(n=6).with_points(exact.astype(np.float32).astype(np.float64))
+    samples, owner = samples_on(cube)
+    noise = np.random.default_rng(1).uniform(-1e-4, 1e-4, exact.shape)
+    moved = onto_planes(exact + noise, cube.faces, samples, owner, np.ones(len(exact), dtype=bool))
+    off = np.abs(moved @ rotation.T - shapes.box(n=6).points)  # 0 or 1 for two coordinates of a point at an edge
+    assert np.sort(off, axis=1)[:, 0].max() < 1e-7
+
+
+def test_samples_on_creases_do_not_keep_faces_from_their_planes():
+    cube = shapes.box(n=6)
+    creases = sharp_edges(cube, 40.0)
+    samples, owner = samples_on(cube, creases=creases)
+    across = np.flatnonzero(np.linalg.norm(samples.normals - cube.face_normals[owner], axis=1) > 0.5)
+    assert len(across) > 0
+    moved = onto_planes(cube.points * (1.0 + 1e-4), cube.faces, samples, owner, np.ones(cube.n_points, dtype=bool))
+    assert np.abs(moved - 1.0)[cube.points == 1.0].max() < 1e-12
+
+
+@pytest.mark.parametrize("size", [1e-2, 5e-3])
+def test_points_farther_from_a_plane_than_a_fiftieth_of_an_edge_stay(size):
     cube = shapes.box(n=6)
     samples, owner = samples_on(cube)
-    bent = cube.points * (1.0 + size)
+    bent = cube.points * (1.0 + size) - np.where(cube.points == 0.0, size, 0.0)
     movable = np.ones(cube.n_points, dtype=bool)
     assert np.array_equal(onto_planes(bent, cube.faces, samples, owner, movable), bent)
 

@@ -19,11 +19,9 @@ from .fit_patch import (
     unit_normal,
 )
 from .triangulation import corner_of, faces_around, flip_side, has_edge, side_towards
-from .vectors import coordinates, dot, eigen_symmetric, length, mapped, solve_symmetric, subtract, subtract_share
+from .vectors import coordinates, dot, length, mapped, solve_symmetric, subtract, subtract_share
 
 _PULLS = (1e-12, 1e-3, 0.03, 0.3)  # weight of the pull towards good shapes, over the trace of the fit's matrix
-_FIRM = 0.3  # of the largest eigenvalue of the fit's matrix, from which on an axis is not pulled along; heuristic
-_EPSILON = 1e-15  # of the same: axes of which samples say nothing are not moved along by them
 _N_SLIDING = 2  # first ones of these, with which a point stays on its crease
 _MIN_MOVE_COSINE = 0.5  # between normals before and after a move
 _MIN_FLIP_COSINE = 0.1  # between normals of triangles after a flip and the mean before
@@ -67,32 +65,6 @@ def _shape_target(fit, n, point):
 
 
 @kernel
-def _pulled_step(values, axes, right, pull, target):
-    """Return the step that fits a point to its samples and is pulled towards a target where they say little.
-
-    Parameters
-    ----------
-    values, axes
-        Eigenvalues and eigenvectors of the matrix of the fit.
-    right
-        Right side of the fit.
-    pull
-        Weight of the pull along axes of which samples say nothing. It falls to nothing where an eigenvalue is a share
-        of the largest, so that what lies in a plane stays there.
-    target
-        Where the point is pulled to, from where it is.
-    """
-    x = y = z = 0.0
-    largest = max(values[0], values[1], values[2])
-    for k in range(3):
-        weight = pull * max(0.0, 1.0 - values[k] / (_FIRM * largest))
-        axis = axes[k]
-        along = (dot(right, axis) + weight * dot(target, axis)) / (max(values[k], 0.0) + weight + _EPSILON * largest)
-        x, y, z = x + along * axis[0], y + along * axis[1], z + along * axis[2]
-    return x, y, z
-
-
-@kernel
 def _move(fit, point, price, max_square):
     """Move a point to the best of some places, and return whether it has moved."""
     mesh, patch = fit.mesh, fit.patch
@@ -118,10 +90,11 @@ def _move(fit, point, price, max_square):
     if not trace > 0.0:
         return False
     target = subtract(_shape_target(fit, n, point), start)
-    values, axes = eigen_symmetric(matrix)
     best, best_place = before, start
     for candidate in range(_N_SLIDING if fit.freedom[point] == 1 else len(_PULLS)):
-        step = _pulled_step(values, axes, right, _PULLS[candidate] * trace, target)
+        pull = _PULLS[candidate] * trace
+        pulled = subtract_share(right, -pull, target)
+        step = solve_symmetric(matrix, pull, pulled)
         if not length(step) <= _MAX_STEP * reach:
             continue
         place = (start[0] + step[0], start[1] + step[1], start[2] + step[2])

@@ -4,9 +4,6 @@ from math import sqrt
 
 from .compiled import inlined, kernel
 
-_MAX_JACOBI_SWEEPS = 12
-_JACOBI_ACCURACY = 1e-15  # of the trace, of the entries beside the diagonal
-
 
 @inlined
 def cross(u, v):
@@ -42,12 +39,6 @@ def subtract(u, v):
 def subtract_share(u, share, v):
     """Return u - share v."""
     return u[0] - share * v[0], u[1] - share * v[1], u[2] - share * v[2]
-
-
-@inlined
-def combined(share, u, other, v):
-    """Return share u + other v."""
-    return share * u[0] + other * v[0], share * u[1] + other * v[1], share * u[2] + other * v[2]
 
 
 @inlined
@@ -131,42 +122,3 @@ def solve_symmetric(matrix, shift, right):
     y = y / second - low_yz * z
     x = x / first - low_y * y - low_z * z
     return x, y, z
-
-
-@inlined
-def _rotation(diagonal, other, beside):
-    """Return cosine and sine of the rotation in a plane that makes the entry beside the diagonal of a matrix zero."""
-    if beside == 0.0:
-        return 1.0, 0.0
-    half = 0.5 * (other - diagonal) / beside
-    tangent = (1.0 if half >= 0.0 else -1.0) / (abs(half) + sqrt(half * half + 1.0))
-    cosine = 1.0 / sqrt(tangent * tangent + 1.0)
-    return cosine, tangent * cosine
-
-
-@kernel
-def eigen_symmetric(matrix):
-    """Return the eigenvalues of a symmetric matrix, as (xx, xy, xz, yy, yz, zz), and three unit eigenvectors.
-
-    References
-    ----------
-    Golub, Van Loan, "Matrix Computations", 2013, section 8.5 (cyclic Jacobi method).
-    """
-    xx, xy, xz, yy, yz, zz = matrix
-    first, second, third = (1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0)
-    for _ in range(_MAX_JACOBI_SWEEPS):
-        if abs(xy) + abs(xz) + abs(yz) <= _JACOBI_ACCURACY * (abs(xx) + abs(yy) + abs(zz)):
-            break
-        c, s = _rotation(xx, yy, xy)
-        xx, yy, xz, yz = xx - s / c * xy, yy + s / c * xy, c * xz - s * yz, s * xz + c * yz
-        xy = 0.0
-        first, second = combined(c, first, -s, second), combined(s, first, c, second)
-        c, s = _rotation(xx, zz, xz)
-        xx, zz, xy, yz = xx - s / c * xz, zz + s / c * xz, -s * yz, c * yz
-        xz = 0.0
-        first, third = combined(c, first, -s, third), combined(s, first, c, third)
-        c, s = _rotation(yy, zz, yz)
-        yy, zz, xy, xz = yy - s / c * yz, zz + s / c * yz, c * xy - s * xz, s * xy + c * xz
-        yz = 0.0
-        second, third = combined(c, second, -s, third), combined(s, second, c, third)
-    return (xx, yy, zz), (first, second, third)
