@@ -10,14 +10,26 @@ from anisomesh.evaluation.preservation import feature_preservation
 from anisomesh.features.detect import corners, points_along, sharp_edges
 from anisomesh.metric.quality import anisotropic_quality
 from anisomesh.shapes.analytic import box
-from anisomesh.shapes.parts import sparse_parts
+from anisomesh.shapes.parts import loft, sparse_parts
 
 pytestmark = pytest.mark.slow
+
+
+def star_prism(tips, subdivisions, inner=0.45, height=0.5):
+    """Return a prism over a star with divided sides."""
+    angle = np.pi * np.arange(2 * tips) / tips
+    radius = np.where(np.arange(2 * tips) % 2 == 0, 1.0, inner)
+    star = np.stack([radius * np.cos(angle), radius * np.sin(angle)], axis=1)
+    share = np.arange(subdivisions)[:, None] / subdivisions
+    sides = [a + share * (b - a) for a, b in zip(star, np.roll(star, -1, axis=0), strict=True)]
+    return loft(np.concatenate(sides), [(0.0, 0.0), (1.0, 0.0), (1.0, height), (0.0, height)])
+
 
 PARTS = {
     "cube of twelve triangles": (lambda: box(n=1), 200),
     "cube at a fifth": (lambda: box(n=4), 20),
     "slab of a grid": (lambda: box((3.0, 2.0, 0.2), n=3), 200),
+    "star in which a chord across a crease is flipped by the fit": (lambda: star_prism(9, 6), 250),
     "rod of a grid": (lambda: box((0.3, 0.3, 4.0), n=2), 120),
     **{name: (lambda part=part: part, 200) for name, part in sparse_parts().items() if part.n_points <= 24},
 }
