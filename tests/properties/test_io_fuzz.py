@@ -140,6 +140,7 @@ FULL_MSH = (
     )
     + '$NodeData\n1\n"a"\n1\n0\n3\n0\n1\n4\n1 1\n7 2\n9 3\n40 4\n$EndNodeData\n'
     + '$ElementData\n1\n"b"\n1\n0\n3\n0\n3\n2\n1 1 2 3\n2 4 5 6\n$EndElementData\n'
+    + '$ElementNodeData\n1\n"c"\n1\n0\n3\n0\n1\n2\n1 3 1 2 3\n2 3 4 5 6\n$EndElementNodeData\n'
 )
 U_OBJ = "".join(f"v {x} {y} 0\n" for x, y in [(0, 0), (3, 0), (3, 3), (2, 3), (2, 1), (1, 1), (1, 3), (0, 3)])
 KINDS = {
