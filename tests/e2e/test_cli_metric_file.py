@@ -183,7 +183,7 @@ def test_values_that_are_no_metric_are_refused(run, square, values, words):
         (["--min-size", "1%", "--gradation", 0.3], "--min-size and --gradation: only sizes can be limited"),
         (["--max-size", "x"], "--max-size"),
         (["--save-metric", "none/m.sol"], "the folder none does not exist"),
-        (["--save-metric", "m.stl"], "--save-metric m.stl: expected a file name ending in .sol, .npy, .vtu"),
+        (["--save-metric", "m.stl"], "--save-metric m.stl: expected a file name ending in .sol, .solb, .npy, .vtu"),
         (["--save-metric", "in.sol"], "in.sol is an input and would be overwritten"),
         (["--save-metric", "out.mesh"], "two outputs have the same file name"),
         (["--save-metric", "-"], "--save-metric -: only the mesh goes to standard output"),

@@ -157,7 +157,7 @@ KINDS = {
     "full.ply": FULL_PLY,
     "full.mesh": FULL_MEDIT,
     "full.msh": FULL_MSH,
-    **{f"full{suffix}": None for suffix in (".glb", ".3mf", ".vtu", ".vtp")},
+    **{f"full{suffix}": None for suffix in (".glb", ".3mf", ".vtu", ".vtp", ".meshb")},
 }
 HOSTILE = [b"999999999", b"-1", b"4294967295", b"1e308", b"nan", b"99999999999999999999", b"", b"0"]
 
