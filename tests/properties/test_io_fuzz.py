@@ -173,9 +173,10 @@ def original(kind, tmp_path):
         point_data={"a": rng.normal(size=8), "color": rng.integers(0, 256, (8, 4), dtype=np.uint8)},
         face_data={"b": rng.normal(size=(3, 2))},
         corner_data={"uv": rng.uniform(size=(3, 3, 2))},
-        regions={name: Regions([1, 1, 2], {1: "one", 2: "two"}) for name in ("object", "material")},
+        regions={name: Regions([1, 1, 2], {1: "one", 2: "two"}) for name in ("object", "material", "texture")},
         features=[[0, 1], [3, 4]],
         fixed_points=[0, 5],
+        materials={"textures": {1: {"data": b"\x89PNG and more"}}},
     )
     save(mesh if kind.startswith("full") else surface, path)
     return path.read_bytes()
