@@ -160,9 +160,9 @@ def test_random_meshes(suffix, mesh):
         }
     if "fixed_points" in kinds:
         assert read.fixed_points.tolist() == mesh.fixed_points.tolist()
-    if suffix in (".msh", *MEDIT, ".vtu", ".vtp"):
+    if suffix in (".ply", ".msh", *MEDIT, ".vtu", ".vtp"):
         division = "reference" if suffix in MEDIT else "physical"
-        for of in ("feature_regions", "fixed_point_regions"):
+        for of in ("feature_regions",) if suffix == ".ply" else ("feature_regions", "fixed_point_regions"):
             assert getattr(read, of).keys() == ({division} if getattr(mesh, of) else set())
             for given_ in getattr(mesh, of).values():
                 np.testing.assert_array_equal(getattr(read, of)[division].labels, given_.labels)

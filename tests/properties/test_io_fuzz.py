@@ -81,6 +81,7 @@ FULL_PLY = """ply
 format ascii 1.0
 comment TextureFile a.png
 comment regions part 1 one
+comment edge_regions region 1 rim
 element vertex 4
 property float x
 property float y
@@ -98,6 +99,7 @@ property int part
 element edge 1
 property int vertex1
 property int vertex2
+property int region
 end_header
 0 0 0 1 2 3 .5 .5 2 1 2
 1 0 0 1 2 3 .5 .5 2 1 2
@@ -105,7 +107,7 @@ end_header
 0 0 1 1 2 3 .5 .5 2 1 2
 3 0 1 2 6 0 0 1 0 0 1 1
 3 1 2 3 6 0 0 1 0 0 1 2
-0 1
+0 1 1
 """
 FULL_MEDIT = """MeshVersionFormatted 2
 Dimension 3
