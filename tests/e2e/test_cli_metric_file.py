@@ -161,8 +161,8 @@ def test_a_metric_of_other_points_is_refused(run, square):
 @pytest.mark.parametrize(
     ("values", "words"),
     [
-        (np.r_[np.ones(624), -1.0], "a.npy, field 'array': size_field[624] is -1"),
-        (np.tile(np.diag([1.0, 1.0, -1.0]), (625, 1, 1)), "a.npy, field 'array': metric[0] = [[1.0, 0.0, 0.0]"),
+        (np.r_[np.ones(624), -1.0], "a.npy, field 'array': row 624 is -1"),
+        (np.tile(np.diag([1.0, 1.0, -1.0]), (625, 1, 1)), "a.npy, field 'array': row 0 = [[1.0, 0.0, 0.0]"),
         (np.tile([[1.0, 0.5, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]], (625, 1, 1)), "is not symmetric"),
     ],
     ids=["negative size", "indefinite", "not symmetric"],
