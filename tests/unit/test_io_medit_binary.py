@@ -133,6 +133,26 @@ def test_tensors_come_back_exactly_and_as_in_text(tmp_path):
         np.testing.assert_array_equal(load_field(tmp_path / name).values, tensors)
 
 
+@pytest.mark.parametrize("name", ["a.sol", "a.solb"])
+def test_damaged_solutions_are_refused_in_one_line_or_read(tmp_path, name):
+    rng = np.random.default_rng(0)
+    surface = Surface(np.array(POINTS), np.array([[0, 1, 2], [0, 2, 3]]))
+    save_tensors(surface, np.tile(np.eye(3), (4, 1, 1)), tmp_path / name)
+    data, n_errors = (tmp_path / name).read_bytes(), 0
+    for case in range(300):
+        changed = bytearray(data)
+        for place in rng.integers(len(data), size=rng.integers(1, 4)):
+            changed[place] = rng.integers(256)
+        (tmp_path / name).write_bytes(data[: rng.integers(len(data))] if case % 3 == 0 else bytes(changed))
+        try:
+            assert len(load_field(tmp_path / name).values) == 4
+        except MeshFileError as error:
+            n_errors += 1
+            assert str(error).startswith(str(tmp_path / name))
+            assert len(str(error).splitlines()) == 1
+    assert n_errors > 50
+
+
 def test_what_follows_the_content_of_a_solution_is_refused(tmp_path):
     file = File(2, "<")
     file.solution([1], [[0.5, 0.5], [1.0, 1.0]])  # rows of two numbers where one is declared
