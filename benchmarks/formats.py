@@ -56,16 +56,23 @@ def unit_vectors(*shape: int) -> np.ndarray:
     return vectors / np.linalg.norm(vectors, axis=-1, keepdims=True)
 
 
-def marked(*, named: bool) -> Mesh:
-    """Return a mesh with regions of its feature edges, and of its fixed points if they have names."""
-    features, fixed = SURFACE.edges[::7], np.arange(0, N_POINTS, 5) if named else np.zeros(0, dtype=np.int64)
-    names = {3: "inlet", 5: "outer rim"} if named else {}
+def marked_edges(names: dict[int, str]) -> Mesh:
+    """Return a mesh with regions of its feature edges."""
+    features = SURFACE.edges[::7]
     return Mesh(
         surface=SURFACE,
         features=features,
-        fixed_points=fixed,
         feature_regions={"physical": Regions(np.arange(len(features)) % 3 + 3, names)},
-        fixed_point_regions={"physical": Regions(np.arange(len(fixed)) % 4 + 2, names)} if named else {},
+    )
+
+
+def marked_points(names: dict[int, str]) -> Mesh:
+    """Return a mesh with regions of its fixed points."""
+    fixed = np.arange(0, N_POINTS, 5)
+    return Mesh(
+        surface=SURFACE,
+        fixed_points=fixed,
+        fixed_point_regions={"physical": Regions(np.arange(len(fixed)) % 4 + 2, names)},
     )
 
 
@@ -91,8 +98,9 @@ MESHES = {
     ),
     "feature edges": Mesh(surface=SURFACE, features=SURFACE.edges[::7]),
     "fixed points": Mesh(surface=SURFACE, fixed_points=np.arange(0, N_POINTS, 5)),
-    "regions of feature edges": marked(named=False),
-    "regions of feature edges and fixed points with names": marked(named=True),
+    "regions of feature edges": marked_edges({}),
+    "regions of feature edges with names": marked_edges({3: "inlet", 4: "tip", 5: "outer rim"}),
+    "regions of fixed points with names": marked_points({3: "inlet", 5: "outer rim"}),
 }
 
 
@@ -112,8 +120,13 @@ def marked_regions(mesh: Mesh) -> list[dict[bytes, tuple[int, str]]]:
 def marked_kept(mesh: Mesh, read: Mesh) -> str:
     """Return how well the regions of features and fixed points were kept, whatever their divisions are called."""
     given, found = marked_regions(mesh), marked_regions(read)
+    if given == found:
+        return EXACT
     numbers = [[{key: label for key, (label, _) in part.items()} for part in both] for both in (given, found)]
-    return EXACT if given == found else "numbers" if numbers[0] == numbers[1] else LOST
+    if numbers[0] == numbers[1]:
+        return "numbers"
+    names = [[{key: name for key, (_, name) in part.items()} for part in both] for both in (given, found)]
+    return NAMES if names[0] == names[1] and any(name for part in names[0] for name in part.values()) else LOST
 
 
 def by_corner(mesh: Mesh) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
@@ -187,7 +200,7 @@ def place(mesh: Mesh, row: np.ndarray) -> bytes:
 
 def kept(mesh: Mesh, read: Mesh) -> str:
     """Return how well a file has kept everything that a mesh carries."""
-    if mesh.feature_regions:
+    if mesh.feature_regions or mesh.fixed_point_regions:
         return marked_kept(mesh, read)
     results = []
     for data in (mesh.point_data, mesh.face_data, mesh.corner_data):
@@ -229,10 +242,11 @@ def round_trip(mesh: Mesh, suffix: str) -> tuple[Mesh, list[str]]:
 
 def table() -> str:
     """Return the table in Markdown."""
-    names = [suffix[1:].upper() if suffix != ".mesh" else "MEDIT" for suffix in MESH_FORMATS]
+    suffixes = [suffix for suffix in MESH_FORMATS if suffix != ".meshb"]  # which holds what .mesh holds
+    names = ["MEDIT" if suffix == ".mesh" else suffix[1:].upper() for suffix in suffixes]
     lines = ["| | " + " | ".join(names) + " |", "|---" * (len(names) + 1) + "|"]
     for kind, mesh in MESHES.items():
-        cells = [kept(mesh, round_trip(mesh, suffix)[0]) for suffix in MESH_FORMATS]
+        cells = [kept(mesh, round_trip(mesh, suffix)[0]) for suffix in suffixes]
         lines.append(f"| {kind} | " + " | ".join(cells) + " |")
     return "\n".join(lines)
 

@@ -198,9 +198,9 @@ def save_metric(result: RemeshResult, path: str | os.PathLike[str]) -> None:
     result
         The result.
     path
-        A .sol file for Mmg and MEDIT, whose rows belong to the vertices of the result, or a .npy file with an array
-        (V, 3, 3); or a .vtu, .vtp, .ply or .msh file with the result, its tensors ``metric`` (9 components, row by row)
-        and ``sizes`` (V, 2), the smallest and largest length of edges along the surface.
+        A .sol or .solb file for Mmg and MEDIT, whose rows belong to the vertices of the result, or a .npy file with an
+        array (V, 3, 3); or a .vtu, .vtp, .ply or .msh file with the result, its tensors ``metric`` (9 components, row
+        by row) and ``sizes`` (V, 2), the smallest and largest length of edges along the surface.
 
     Raises
     ------

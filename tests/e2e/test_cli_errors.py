@@ -101,7 +101,25 @@ def test_no_figure_overwrites_its_input_through_a_link(run_cli, torus_obj, tmp_p
 
 
 def test_a_ratio_that_no_machine_can_do_is_refused(refuse, torus_obj):
-    assert "ratio = 1e+308" in refuse(1, "remesh", torus_obj, "-o", "out.ply", "--ratio", "1e308")
+    assert "--ratio = 1e+308" in refuse(1, "remesh", torus_obj, "-o", "out.ply", "--ratio", "1e308")
+
+
+@pytest.mark.parametrize(
+    ("words", "expected"),
+    [
+        (["-n", 100, "--lock", "lid"], "error: --lock = 'lid' is not a region of the mesh"),
+        (["-n", 100, "--weld", "1000"], "error: --weld is 1000; expected a length"),
+        (["-n", 100, "--seed", 2**64], f"error: --seed = {2**64}; expected a whole number"),
+        (["-n", 100, "--keep-points", "few.txt"], "error: --keep-points has 99999; expected 0 to"),
+        (["--edge-length", ".3", "--density", "ones.txt"], "an --edge-length or size of --metric-file both say"),
+    ],
+)
+def test_messages_name_options_of_the_command_line(refuse, torus_obj, tmp_path, words, expected):
+    """Regression: messages had the names that options have in Python, such as weld_tolerance."""
+    n = sum(line.startswith("v ") for line in torus_obj.read_text().splitlines())
+    (tmp_path / "few.txt").write_text("99999\n")
+    (tmp_path / "ones.txt").write_text("1\n" * n)
+    assert expected in refuse(1, "remesh", torus_obj, "-o", "out.ply", *words)
 
 
 def test_an_output_that_is_a_loop_of_links_is_refused(refuse, torus_obj, tmp_path):

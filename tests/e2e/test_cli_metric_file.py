@@ -161,8 +161,8 @@ def test_a_metric_of_other_points_is_refused(run, square):
 @pytest.mark.parametrize(
     ("values", "words"),
     [
-        (np.r_[np.ones(624), -1.0], "a.npy, field 'array': size_field[624] is -1"),
-        (np.tile(np.diag([1.0, 1.0, -1.0]), (625, 1, 1)), "a.npy, field 'array': metric[0] = [[1.0, 0.0, 0.0]"),
+        (np.r_[np.ones(624), -1.0], "a.npy, field 'array': row 624 is -1"),
+        (np.tile(np.diag([1.0, 1.0, -1.0]), (625, 1, 1)), "a.npy, field 'array': row 0 = [[1.0, 0.0, 0.0]"),
         (np.tile([[1.0, 0.5, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]], (625, 1, 1)), "is not symmetric"),
     ],
     ids=["negative size", "indefinite", "not symmetric"],
@@ -183,7 +183,7 @@ def test_values_that_are_no_metric_are_refused(run, square, values, words):
         (["--min-size", "1%", "--gradation", 0.3], "--min-size and --gradation: only sizes can be limited"),
         (["--max-size", "x"], "--max-size"),
         (["--save-metric", "none/m.sol"], "the folder none does not exist"),
-        (["--save-metric", "m.stl"], "--save-metric m.stl: expected a file name ending in .sol, .npy, .vtu"),
+        (["--save-metric", "m.stl"], "--save-metric m.stl: expected a file name ending in .sol, .solb, .npy, .vtu"),
         (["--save-metric", "in.sol"], "in.sol is an input and would be overwritten"),
         (["--save-metric", "out.mesh"], "two outputs have the same file name"),
         (["--save-metric", "-"], "--save-metric -: only the mesh goes to standard output"),

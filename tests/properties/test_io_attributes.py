@@ -54,6 +54,15 @@ def test_the_page_of_formats_has_the_table():
     assert page.split(formats.BEGIN)[1].split(formats.END)[0].strip() == formats.table()
 
 
+@pytest.mark.parametrize("kind", formats.MESHES)
+def test_binary_medit_files_hold_what_text_holds(kind):
+    mesh = formats.MESHES[kind]
+    (text, warnings), (binary, same_warnings) = (formats.round_trip(mesh, suffix) for suffix in MEDIT)
+    assert same_warnings == warnings
+    assert formats.kept(mesh, binary) == formats.kept(mesh, text)
+    np.testing.assert_array_equal(binary.surface.points, text.surface.points)
+
+
 @pytest.mark.parametrize("suffix", MESH_FORMATS)
 def test_a_bare_mesh_stays_bare(suffix):
     read, warnings = formats.round_trip(Mesh(surface=formats.SURFACE), suffix)
@@ -61,6 +70,7 @@ def test_a_bare_mesh_stays_bare(suffix):
     assert warnings == []
 
 
+MEDIT = (".mesh", ".meshb")
 FULL = {
     ".obj": ("point_data", "corner_data", "features", "fixed_points"),
     ".ply": ("point_data", "corner_data", "face_data", "regions", "features"),
@@ -68,6 +78,7 @@ FULL = {
     ".vtp": ("point_data", "face_data", "regions", "features", "fixed_points"),
     ".msh": ("point_data", "face_data", "regions", "features", "fixed_points"),
     ".mesh": ("regions", "features", "fixed_points"),
+    ".meshb": ("regions", "features", "fixed_points"),
     ".stl": (),
     ".glb": (),
     ".3mf": (),
@@ -139,23 +150,23 @@ def test_random_meshes(suffix, mesh):
                 continue
             found = getattr(read, kind)[name]
             np.testing.assert_array_equal(found, values.reshape(len(values), *found.shape[1:]))
-    if "regions" in kinds and mesh.regions and (mesh.regions["physical"].labels.any() or suffix != ".mesh"):
-        found, given_ = read.regions["reference" if suffix == ".mesh" else "physical"], mesh.regions["physical"]
+    if "regions" in kinds and mesh.regions and (mesh.regions["physical"].labels.any() or suffix not in MEDIT):
+        found, given_ = read.regions["reference" if suffix in MEDIT else "physical"], mesh.regions["physical"]
         np.testing.assert_array_equal(found.labels, given_.labels)
-        assert suffix == ".mesh" or found.names == given_.names
+        assert suffix in MEDIT or found.names == given_.names
     if "features" in kinds:
         assert {tuple(row) for row in np.sort(read.features).tolist()} == {
             tuple(row) for row in np.sort(mesh.features).tolist()
         }
     if "fixed_points" in kinds:
         assert read.fixed_points.tolist() == mesh.fixed_points.tolist()
-    if suffix in (".msh", ".mesh", ".vtu", ".vtp"):
-        division = "reference" if suffix == ".mesh" else "physical"
-        for of in ("feature_regions", "fixed_point_regions"):
+    if suffix in (".ply", ".msh", *MEDIT, ".vtu", ".vtp"):
+        division = "reference" if suffix in MEDIT else "physical"
+        for of in ("feature_regions",) if suffix == ".ply" else ("feature_regions", "fixed_point_regions"):
             assert getattr(read, of).keys() == ({division} if getattr(mesh, of) else set())
             for given_ in getattr(mesh, of).values():
                 np.testing.assert_array_equal(getattr(read, of)[division].labels, given_.labels)
-                assert suffix == ".mesh" or getattr(read, of)[division].names == given_.names
+                assert suffix in MEDIT or getattr(read, of)[division].names == given_.names
 
 
 NAMES_ONLY = (".obj", ".stl", ".glb", ".3mf")
@@ -167,7 +178,7 @@ NAMES_ONLY = (".obj", ".stl", ".glb", ".3mf")
 def test_regions_without_names_keep_their_numbers(suffix, division, labels):
     mesh = Mesh(surface=formats.SURFACE, regions={division: Regions(np.resize(labels, formats.N_FACES))})
     read, warnings = formats.round_trip(mesh, suffix)
-    if suffix == ".mesh" and labels == (0,):  # no faces have references
+    if suffix in MEDIT and labels == (0,):  # no faces have references
         assert warnings == [f"stream: left out what MEDIT cannot hold: regions '{division}'"]
     else:
         assert warnings == []
@@ -191,7 +202,7 @@ def test_names_and_numbers_in_one_division(suffix):
 ODD_NAMES = {1: ' two  blanks "and quotes"', 2: "it's\nin two lines", 3: '"', 4: "$EndComments", 5: "Wand 3 \u2028"}
 
 
-@pytest.mark.parametrize("suffix", sorted(set(MESH_FORMATS) - {".off", ".mesh"}))
+@pytest.mark.parametrize("suffix", sorted(set(MESH_FORMATS) - {".off", *MEDIT}))
 def test_odd_names_of_regions_are_kept_or_named(suffix):
     labels = np.resize(list(ODD_NAMES), formats.N_FACES)
     mesh = Mesh(surface=formats.SURFACE, regions={"my part": Regions(labels, ODD_NAMES)})

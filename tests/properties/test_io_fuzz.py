@@ -81,6 +81,7 @@ FULL_PLY = """ply
 format ascii 1.0
 comment TextureFile a.png
 comment regions part 1 one
+comment edge_regions region 1 rim
 element vertex 4
 property float x
 property float y
@@ -98,6 +99,7 @@ property int part
 element edge 1
 property int vertex1
 property int vertex2
+property int region
 end_header
 0 0 0 1 2 3 .5 .5 2 1 2
 1 0 0 1 2 3 .5 .5 2 1 2
@@ -105,7 +107,7 @@ end_header
 0 0 1 1 2 3 .5 .5 2 1 2
 3 0 1 2 6 0 0 1 0 0 1 1
 3 1 2 3 6 0 0 1 0 0 1 2
-0 1
+0 1 1
 """
 FULL_MEDIT = """MeshVersionFormatted 2
 Dimension 3
@@ -140,6 +142,7 @@ FULL_MSH = (
     )
     + '$NodeData\n1\n"a"\n1\n0\n3\n0\n1\n4\n1 1\n7 2\n9 3\n40 4\n$EndNodeData\n'
     + '$ElementData\n1\n"b"\n1\n0\n3\n0\n3\n2\n1 1 2 3\n2 4 5 6\n$EndElementData\n'
+    + '$ElementNodeData\n1\n"c"\n1\n0\n3\n0\n1\n2\n1 3 1 2 3\n2 3 4 5 6\n$EndElementNodeData\n'
 )
 U_OBJ = "".join(f"v {x} {y} 0\n" for x, y in [(0, 0), (3, 0), (3, 3), (2, 3), (2, 1), (1, 1), (1, 3), (0, 3)])
 KINDS = {
@@ -156,7 +159,7 @@ KINDS = {
     "full.ply": FULL_PLY,
     "full.mesh": FULL_MEDIT,
     "full.msh": FULL_MSH,
-    **{f"full{suffix}": None for suffix in (".glb", ".3mf", ".vtu", ".vtp")},
+    **{f"full{suffix}": None for suffix in (".glb", ".3mf", ".vtu", ".vtp", ".meshb")},
 }
 HOSTILE = [b"999999999", b"-1", b"4294967295", b"1e308", b"nan", b"99999999999999999999", b"", b"0"]
 
@@ -172,9 +175,10 @@ def original(kind, tmp_path):
         point_data={"a": rng.normal(size=8), "color": rng.integers(0, 256, (8, 4), dtype=np.uint8)},
         face_data={"b": rng.normal(size=(3, 2))},
         corner_data={"uv": rng.uniform(size=(3, 3, 2))},
-        regions={name: Regions([1, 1, 2], {1: "one", 2: "two"}) for name in ("object", "material")},
+        regions={name: Regions([1, 1, 2], {1: "one", 2: "two"}) for name in ("object", "material", "texture")},
         features=[[0, 1], [3, 4]],
         fixed_points=[0, 5],
+        materials={"textures": {1: {"data": b"\x89PNG and more"}}},
     )
     save(mesh if kind.startswith("full") else surface, path)
     return path.read_bytes()

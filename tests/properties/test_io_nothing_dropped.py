@@ -171,10 +171,12 @@ def labelled(mesh, rows, regions):
 
 
 def same_labels(given, found):
-    """Return whether the same places have the same labels, and names if they have any."""
-    return given.keys() == found.keys() and all(
-        label == found[key][0] and text in ("", found[key][1]) for key, (label, text) in given.items()
-    )
+    """Return whether the same places are in the same regions, and these still have their names, if any, in one line."""
+    if given.keys() != found.keys():
+        return False
+    pairs = {(*given[key], *found[key]) for key in given}
+    one_to_one = len(pairs) == len({label for label, *_ in pairs}) == len({label for _, _, label, _ in pairs})
+    return one_to_one and all(text in ("", name, name.rpartition("_")[0]) for _, text, _, name in pairs)
 
 
 def plain(text):

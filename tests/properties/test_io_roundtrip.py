@@ -15,7 +15,7 @@ from anisomesh.mesh.surface import Surface
 from anisomesh.shapes import analytic as shapes
 from conftest import examples
 
-EXACT = [".obj", ".off", ".ply", ".3mf", ".vtu", ".vtp", ".msh", ".mesh"]
+EXACT = [".obj", ".off", ".ply", ".3mf", ".vtu", ".vtp", ".msh", ".mesh", ".meshb"]
 any_float = st.floats(allow_nan=False, allow_infinity=False)
 
 

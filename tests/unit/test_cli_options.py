@@ -7,6 +7,7 @@ import pytest
 import typer
 
 from anisomesh.cli.main import app
+from anisomesh.cli.spelling import _SPELLINGS, as_options
 from anisomesh.options import RemeshOptions
 
 PYTHON_ONLY = {
@@ -39,3 +40,36 @@ def test_every_option_of_a_remesh_is_described():
     for name in PYTHON_ONLY:
         row = next(line for line in page.splitlines() if line.startswith("|") and f"`{name}`" in line)
         assert "Python only" in row
+
+
+def test_messages_spell_options_that_there_are():
+    options = {option for parameter in COMMAND.params for option in parameter.opts}
+    assert {spelling.split()[-1] for spelling in _SPELLINGS.values()} <= options
+
+
+@pytest.mark.parametrize(
+    ("message", "expected"),
+    [
+        ("keep_points has 999; expected 0 to 127", "--keep-points has 999; expected 0 to 127"),
+        ("weld_tolerance is 1000; expected", "--weld is 1000; expected"),
+        ("give one of n_vertices, max_error and edge_length", "give one of --vertices, --max-error and --edge-length"),
+        (
+            "a density and an edge_length or size_field both say",
+            "a density and an --edge-length or size of --metric-file both",
+        ),
+        ("with max_error only the distance counts", "with --max-error only the distance counts"),
+        ("lock = 'a' is not a region; lock = it", "--lock = 'a' is not a region; lock = it"),
+        ("density[0] = -1", "--density[0] = -1"),
+        ("device 'cuda' cannot be used", "--device 'cuda' cannot be used"),
+        ("in.obj: seed = 5", "in.obj: --seed = 5"),
+        ("features of the input have moved", "features of the input have moved"),
+        (
+            "out/max_error.ply: no field 'min_size' and \"max_size\"",
+            "out/max_error.ply: no field 'min_size' and \"max_size\"",
+        ),
+        ("max_error.ply: cannot be read", "max_error.ply: cannot be read"),
+        ("it takes n_vertices.", "it takes --vertices."),
+    ],
+)
+def test_options_in_messages_are_spelled_as_on_the_command_line(message, expected):
+    assert as_options(message).startswith(expected)

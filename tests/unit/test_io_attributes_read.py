@@ -226,9 +226,9 @@ $ElementData
 1
 3 1 2 3
 $EndElementData
-$ElementNodeData
+$Periodic
 0
-$EndElementNodeData
+$EndPeriodic
 """
 
 
@@ -247,7 +247,7 @@ def test_gmsh(tmp_path, caplog):
     said = [record.getMessage().partition(": ")[2] for record in caplog.records]
     assert said == [
         "1 surface(s) are in several physical groups and kept in the first only",
-        "left out its ElementNodeData",
+        "left out its Periodic",
         "left out a further time step of the data 'flow'",
     ]
 

@@ -69,15 +69,17 @@ def test_a_tensor_of_the_plane_acts_on_the_plane_as_it_is():
 @pytest.mark.parametrize(
     ("content", "words"),
     [
-        (b"\x01\x00\x00\x00\x02\x00\x00\x00", "it is binary; save it as text"),
+        (b"\x01\x00\x00\x00\x02\x00\x00\x00", "no section SolAtVertices"),
+        (b"\x01\x00\x00\x00\x02\x00", "truncated: a section should begin at byte 4 of 6"),
         (b"hello", "does not begin with MeshVersionFormatted"),
         (HEAD.encode(), "no section SolAtVertices"),
         (b"MeshVersionFormatted 2 Dimension 4 SolAtVertices 1 1 1 1", "its dimension is 4"),
         (HEAD.encode() + b"SolAtVertices 2 1 3 1 2 3 4 5 6 End", "truncated: SolAtVertices declares 2 rows of 6 but 6"),
         (HEAD.encode() + b"SolAtVertices 1 1 7 1", "fields are of types .7."),
-        (HEAD.encode() + b"SolAtVertices 1 2 1", "fields are of types .1."),
-        (HEAD.encode() + b"SolAtVertices 1 1 1 1.x", "truncated or malformed"),
-        (HEAD.encode() + b"SolAtVertices", "truncated or malformed"),
+        (HEAD.encode() + b"SolAtVertices 1 2 1", "truncated: the section SolAtVertices has 1 numbers where 2"),
+        (HEAD.encode() + b"SolAtVertices 1 1 1 1.x", "the section SolAtVertices should give numbers"),
+        (HEAD.encode() + b"SolAtVertices 1 1 1 1 2", "malformed: more than the 1 rows of 1 numbers"),
+        (HEAD.encode() + b"SolAtVertices", "truncated: the section SolAtVertices has no count"),
     ],
 )
 def test_a_broken_solution_is_refused(tmp_path, content, words):
@@ -177,8 +179,7 @@ def test_files_that_hold_no_field_are_refused(tmp_path):
         "c.npy": "cannot be read as NPY",
         "d.npy": "cannot be read as NPY",
         "d.sol": "cannot be read: No such file",
-        "a.solb": "binary MEDIT files are not read",
-        "a.txt": "unknown format .txt; expected one of .sol, .npy",
+        "a.txt": "unknown format .txt; expected one of .sol, .solb, .npy",
     }.items():
         with pytest.raises(MeshFileError, match=words):
             load_field(tmp_path / name)

@@ -15,10 +15,12 @@ from anisomesh.cli import benchmark, dataset, demo, evaluate, info, train
 from anisomesh.cli.figures import group as figure
 from anisomesh.cli.log import logs
 from anisomesh.cli.remeshing.command import command as remesh_command
+from anisomesh.cli.spelling import as_options
 from anisomesh.errors import AnisomeshError
 
 # The base class of all usage errors; typer exports only this subclass.
 _UsageError: type[Exception] = typer.BadParameter.__bases__[0]
+_WITH_FILES_OF_OPTIONS = ("benchmark", "dataset", "train")  # commands that read options by their names in Python
 
 app = typer.Typer(
     name="anisomesh",
@@ -77,7 +79,7 @@ def main(arguments: list[str]) -> int:
     except _UsageError as error:
         return _fail(_usage_message(error), 2)
     except AnisomeshError as error:
-        return _fail(str(error), 1)
+        return _fail(str(error) if arguments[0] in _WITH_FILES_OF_OPTIONS else as_options(str(error)), 1)
     except BrokenPipeError:
         os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
         return 1

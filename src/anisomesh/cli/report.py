@@ -7,6 +7,8 @@ import math
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from anisomesh.cli.spelling import warning_rows
+
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
@@ -93,7 +95,7 @@ def summary(report: dict[str, Any], written: Sequence[Path], notes: Sequence[str
         ("optimiser", f"{counted(report['iterations'], 'iteration')}{energy}: {report['status']}"),
         ("seconds", f"{seconds['total']:.2f} ({stages})"),
         *(("prepared", note) for note in notes),
-        *(("warning", text) for text in report["warnings"]),
+        *warning_rows(report["warnings"]),
         *(("hint", text) for text in report.get("hints", [])),
         *(("wrote", str(path)) for path in written),
     ]

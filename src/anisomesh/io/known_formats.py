@@ -12,7 +12,7 @@ from anisomesh.io.formats.gltf.write import glb_bytes
 from anisomesh.io.formats.gmsh.read import read_msh
 from anisomesh.io.formats.gmsh.write import msh_bytes
 from anisomesh.io.formats.medit.read import read_medit
-from anisomesh.io.formats.medit.write import medit_bytes
+from anisomesh.io.formats.medit.write import medit_bytes, meditb_bytes
 from anisomesh.io.formats.obj.read import read_obj
 from anisomesh.io.formats.obj.write import obj_bytes
 from anisomesh.io.formats.off import off_bytes, read_off
@@ -37,6 +37,7 @@ READERS: dict[str, Callable[[bytes], PolygonSoup]] = {
     ".vtp": read_vtp,
     ".msh": read_msh,
     ".mesh": read_medit,
+    ".meshb": read_medit,
 }
 WRITERS: dict[str, Callable[[Mesh, Losses], bytes]] = {
     ".obj": obj_bytes,
@@ -49,6 +50,7 @@ WRITERS: dict[str, Callable[[Mesh, Losses], bytes]] = {
     ".vtp": vtp_mesh_bytes,
     ".msh": msh_bytes,
     ".mesh": medit_bytes,
+    ".meshb": meditb_bytes,
 }
 TEXT_FORMATS = (".obj", ".off", ".ply", ".msh", ".mesh")  # may begin with a byte order mark
 MESH_FORMATS = tuple(READERS)

@@ -34,8 +34,8 @@ def load(path: str | os.PathLike[str] | BinaryIO, *, file_format: str | None = N
     Parameters
     ----------
     path
-        A file with the extension .obj, .off, .ply, .stl, .glb, .3mf, .vtu, .vtp, .msh (Gmsh) or .mesh (MEDIT), in
-        either case; or a stream that is open for reading bytes, together with ``file_format``.
+        A file with the extension .obj, .off, .ply, .stl, .glb, .3mf, .vtu, .vtp, .msh (Gmsh), .mesh or .meshb
+        (MEDIT), in either case; or a stream that is open for reading bytes, together with ``file_format``.
     file_format
         The format, such as ``"ply"``, if the extension does not name it.
 
@@ -220,7 +220,7 @@ def save(
         with atomic_path(name) as temporary:
             temporary.write_bytes(content)
     if losses.text():
-        format_name = "MEDIT" if suffix == ".mesh" else suffix[1:].upper()
+        format_name = "MEDIT" if suffix in (".mesh", ".meshb") else suffix[1:].upper()
         logger.warning("%s: left out what %s cannot hold: %s", name, format_name, losses.text())
 
 

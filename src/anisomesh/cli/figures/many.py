@@ -22,6 +22,7 @@ from anisomesh.cli.figures.options import (
 from anisomesh.cli.job import read, run_remesh
 from anisomesh.cli.progress import progress
 from anisomesh.cli.report import counted
+from anisomesh.cli.spelling import warning_rows
 
 if TYPE_CHECKING:
     from anisomesh.mesh.surface import Surface
@@ -102,7 +103,7 @@ def strip(
             result, facts = run_remesh(surface, display, name=str(source), load_seconds=seconds, ratio=ratio, **options)
             panels.append(Panel(surface=result.surface, name=f"{100 * ratio:g} %", note=_vertices(result.surface)))
             rows.append((panels[-1].name, size(result.surface)))
-            rows += [("warning", text) for text in facts["warnings"]]
+            rows += warning_rows(facts["warnings"])
         display.note(f"drawing {out}")
         draw(panels, out, columns=len(panels), same_view=True, options=view)
     conclude(rows, out, quiet)

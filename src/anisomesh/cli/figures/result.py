@@ -20,6 +20,7 @@ from anisomesh.cli.figures.options import (
 )
 from anisomesh.cli.job import read, run_remesh
 from anisomesh.cli.progress import Display, progress
+from anisomesh.cli.spelling import warning_rows
 
 if TYPE_CHECKING:
     from anisomesh.mesh.surface import Surface
@@ -73,7 +74,7 @@ def command(
         side_by_side(before, after, out, values=colouring, cells=polygons, options=view)
     rows = [("input", size(before)), ("result", size(after))]
     rows += [] if colouring is None else [("colour", colouring.name)]
-    conclude([*rows, *(("warning", text) for text in warnings)], out, quiet)
+    conclude([*rows, *warning_rows(warnings)], out, quiet)
 
 
 def _check_choice(remeshed: Path | None, cells: bool, n_vertices: int | None, ratio: float | None) -> None:

@@ -96,8 +96,8 @@ def command(
         str | None,
         _input(
             metavar="FILE[:NAME]",
-            help="Lengths of edges, or metric tensors, at the points of IN, in model units: .sol, .npy, or point data "
-            "of .vtu, .vtp, .ply, .msh. Enough without a number of vertices, which then follows.",
+            help="Lengths of edges, or metric tensors, at the points of IN, in model units: .sol, .solb, .npy, or "
+            "point data of .vtu, .vtp, .ply, .msh. Enough without a number of vertices, which then follows.",
         ),
     ] = None,
     min_size: Annotated[
@@ -146,8 +146,8 @@ def command(
         Path | None,
         _output(
             metavar="FILE",
-            help="Write the metric at the points of OUT, in which its edges have the length 1: .sol (Mmg), .msh "
-            "(Gmsh), .vtu, .vtp, .ply or .npy.",
+            help="Write the metric at the points of OUT, in which its edges have the length 1: .sol or .solb "
+            "(Mmg), .msh (Gmsh), .vtu, .vtp, .ply or .npy.",
         ),
     ] = None,
     picture: Annotated[

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass
@@ -149,7 +150,8 @@ class MetricFile:
         except (MetricError, OptionError) as error:
             if not str(error).startswith(("metric", "size_field")):
                 raise
-            raise type(error)(f"{self.field.path}, field {self.field.name!r}: {error}") from error
+            row = re.sub(r"^(metric|size_field)\[(\d+)\]", r"row \2", str(error))
+            raise type(error)(f"{self.field.path}, field {self.field.name!r}: {row}") from error
 
 
 @dataclass(frozen=True)

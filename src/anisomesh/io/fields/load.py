@@ -15,13 +15,15 @@ import numpy.typing as npt
 from anisomesh._arrays import Points
 from anisomesh.errors import MeshFileError
 from anisomesh.io.carried import Array
-from anisomesh.io.formats.medit.solution import PLANE, read_sol, sol_dimension
+from anisomesh.io.formats.medit.sections import PLANE
+from anisomesh.io.formats.medit.solution import read_sol, sol_dimension
 from anisomesh.io.known_formats import MESH_FORMATS
 from anisomesh.io.meshes import load_mesh
 
 FieldKind = Literal["scalar", "vector", "tensor"]
 
-_FIELD_FORMATS = (".sol", ".solb", ".npy", *MESH_FORMATS)
+_SOLUTIONS = (".sol", ".solb")  # of MEDIT
+_FIELD_FORMATS = (*_SOLUTIONS, ".npy", *MESH_FORMATS)
 _SPEC = re.compile(rf"(.*?(?:{'|'.join(map(re.escape, _FIELD_FORMATS))})):(.+)", re.IGNORECASE | re.DOTALL)
 _KIND_OF_WIDTH: dict[int, FieldKind] = {1: "scalar", 2: "vector", 3: "vector", 9: "tensor"}  # of rows
 _UPPER = ((0, 0), (1, 1), (2, 2), (0, 1), (1, 2), (0, 2))  # VTK's order of symmetric tensors
@@ -66,7 +68,7 @@ def load_field(spec: str | os.PathLike[str], kinds: Collection[FieldKind] = ("sc
     Parameters
     ----------
     spec
-        ``FILE`` or ``FILE:NAME``. The file is a MEDIT solution (.sol, text), whose fields are called 1, 2, ...; an
+        ``FILE`` or ``FILE:NAME``. The file is a MEDIT solution (.sol or .solb), whose fields are called 1, 2, ...; an
         array of NumPy (.npy); or any mesh file with point data (.vtu, .vtp, .ply, .msh, .glb). The name may be left out
         if one field of real numbers is of the wanted kinds.
     kinds
@@ -85,8 +87,8 @@ def load_field(spec: str | os.PathLike[str], kinds: Collection[FieldKind] = ("sc
 
     Notes
     -----
-    Tensors have 9 components, row by row, or in VTU and VTP files 6 in VTK's order XX YY ZZ XY YZ XZ, and in .sol files
-    6 in the order m11 m12 m22 m13 m23 m33.
+    Tensors have 9 components, row by row, or in VTU and VTP files 6 in VTK's order XX YY ZZ XY YZ XZ, and in MEDIT
+    solutions 6 in the order m11 m12 m22 m13 m23 m33.
     """
     path, name = split_spec(spec)
     data, points = _data(path)
@@ -108,7 +110,7 @@ def load_field(spec: str | os.PathLike[str], kinds: Collection[FieldKind] = ("sc
         six = "; 6 components have a known order in VTU and VTP files only" if values.shape[1:] == (6,) else ""
         raise MeshFileError(f"{path}: the field {name!r} is {_shape(values)}; {_expected(kinds)}{six}")
     layout = "XX YY ZZ XY YZ XZ" if values.shape[1:] == (6,) else "row by row" if kind == "tensor" else ""
-    if path.suffix.lower() == ".sol" and kind == "tensor":
+    if path.suffix.lower() in _SOLUTIONS and kind == "tensor":
         planar = sol_dimension(path.read_bytes()) == PLANE
         layout = "m11 m12 m22, and for m33 the mean of m11 and m22" if planar else "m11 m12 m22 m13 m23 m33"
     return PointField(path=path, name=name, kind=kind, values=_rows(values, kind), points=points, layout=layout)
@@ -117,14 +119,12 @@ def load_field(spec: str | os.PathLike[str], kinds: Collection[FieldKind] = ("sc
 def _data(path: Path) -> tuple[Mapping[str, Array], Points | None]:
     """Return the arrays at the points of a file by name, and its points if it has some."""
     suffix = path.suffix.lower()
-    if suffix == ".solb":
-        raise MeshFileError(f"{path}: binary MEDIT files are not read; save it as text, a .sol file")
     if suffix in MESH_FORMATS:
         mesh = load_mesh(path)
         return mesh.point_data, mesh.surface.points
-    if suffix not in (".sol", ".npy"):
+    if suffix not in _FIELD_FORMATS:
         raise MeshFileError(
-            f"{path}: unknown format {suffix or '(no extension)'}; expected one of .sol, .npy, "
+            f"{path}: unknown format {suffix or '(no extension)'}; expected one of .sol, .solb, .npy, "
             f"{', '.join(sorted(MESH_FORMATS))}, and :NAME behind it"
         )
     try:

@@ -13,11 +13,11 @@ from anisomesh.attributes.model import Mesh
 from anisomesh.errors import MeshFileError
 from anisomesh.io.atomic import atomic_path
 from anisomesh.io.carried import Array
-from anisomesh.io.formats.medit.solution import sol_bytes
+from anisomesh.io.formats.medit.solution import sol_bytes, solb_bytes
 from anisomesh.io.meshes import save
 from anisomesh.mesh.surface import Surface
 
-TENSOR_FORMATS = (".sol", ".npy", ".vtu", ".vtp", ".ply", ".msh")
+TENSOR_FORMATS = (".sol", ".solb", ".npy", ".vtu", ".vtp", ".ply", ".msh")
 """Extensions of files that hold a tensor at each point in float64."""
 
 
@@ -33,8 +33,9 @@ def save_tensors(
     tensors
         Tensors (V, 3, 3).
     path
-        A MEDIT solution (.sol) or an array of NumPy (.npy), which hold the tensors only; or .vtu, .vtp, .ply or .msh,
-        which hold the surface too, with the tensors as point data ``metric`` of 9 components, row by row.
+        A MEDIT solution (.sol, or .solb, which is binary) or an array of NumPy (.npy), which hold the tensors only; or
+        .vtu, .vtp, .ply or .msh, which hold the surface too, with the tensors as point data ``metric`` of 9 components,
+        row by row.
     others
         Further point data for the formats that hold the surface.
 
@@ -46,11 +47,11 @@ def save_tensors(
     suffix = Path(path).suffix.lower()
     if suffix not in TENSOR_FORMATS:
         raise MeshFileError(f"{path}: expected a file name ending in one of {', '.join(TENSOR_FORMATS)}")
-    if suffix not in (".sol", ".npy"):
+    if suffix not in (".sol", ".solb", ".npy"):
         save(Mesh(surface=surface), path, point_data={"metric": tensors.reshape(-1, 9), **(others or {})})
         return
     with atomic_path(path) as temporary:
         if suffix == ".npy":
             np.save(temporary, tensors, allow_pickle=False)
         else:
-            temporary.write_bytes(sol_bytes(tensors))
+            temporary.write_bytes(solb_bytes(tensors) if suffix == ".solb" else sol_bytes(tensors))

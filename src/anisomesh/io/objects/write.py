@@ -39,7 +39,7 @@ def to_pyvista(mesh: Mesh) -> Any:
     Parameters
     ----------
     mesh
-        The mesh, such as the ``mesh`` of a result.
+        The mesh, such as the ``mesh`` of a result. What the object cannot hold is named in one warning in the log.
 
     Returns
     -------
@@ -80,7 +80,7 @@ def to_meshio(mesh: Mesh) -> Any:
     Parameters
     ----------
     mesh
-        The mesh, such as the ``mesh`` of a result.
+        As for :func:`to_pyvista`.
 
     Returns
     -------
@@ -166,7 +166,7 @@ def to_trimesh(mesh: Mesh) -> Any:
     Parameters
     ----------
     mesh
-        The mesh, such as the ``mesh`` of a result.
+        As for :func:`to_pyvista`.
 
     Returns
     -------

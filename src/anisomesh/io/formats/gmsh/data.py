@@ -4,9 +4,12 @@ from __future__ import annotations
 
 import json
 import re
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
+from functools import partial
+from typing import NamedTuple
 
 import numpy as np
+import numpy.typing as npt
 
 from anisomesh.io.carried import Array, Carried, Integers, grouped_columns, is_region
 from anisomesh.io.formats.gmsh.elements import PHYSICAL, Entities
@@ -20,7 +23,7 @@ UNLABELLED = "anisomesh points without region"
 """Beginning of the comment with the number of the physical group that only makes points fixed."""
 
 _POINT, _LINE, _SURFACE = 0, 1, 2  # dimensions
-_SKIPPED = (b"ElementNodeData", b"Periodic", b"GhostElements", b"PartitionedEntities")
+_SKIPPED = (b"Periodic", b"GhostElements", b"PartitionedEntities")
 
 
 def sections(data: bytes, name: bytes) -> Iterator[bytes]:
@@ -132,24 +135,55 @@ def read_data(data: bytes, numbers: NumberStream, carried: Carried, tags: tuple[
         (b"NodeData", carried.point_data, tags[0]),
         (b"ElementData", carried.cell_data, tags[1]),
     ):
-        columns: dict[str, Array] = {}
-        for section in sections(data, name):
-            with carried.optional(f"${name.decode()}"):
-                key, values = _data(section, numbers, rows)
-                if key in columns:
-                    carried.remarks.append(f"left out a further time step of the data {key!r}")
-                else:
-                    columns[key] = values
-        for key, values in grouped_columns(columns).items():
-            into[key] = values
+        into |= _first_steps(data, name, carried, partial(_data, numbers, rows))
+
+
+def read_data_at_corners(
+    data: bytes, numbers: NumberStream, carried: Carried, tags: Integers, places: Integers
+) -> dict[str, Array]:
+    """Return $ElementNodeData of the first time step by name, with a row for each node of each element.
+
+    Parameters
+    ----------
+    data, numbers
+        The file, and a stream of numbers of its type.
+    carried
+        Remarks are added here.
+    tags, places
+        Tags (n,) of the elements, and number of the first node and number of nodes (n, 2) of each.
+    """
+    return _first_steps(data, b"ElementNodeData", carried, partial(_data_at_corners, numbers, tags, places))
 
 
 def _are_integers(values: Array) -> bool:
     return bool((np.isfinite(values) & (values == np.rint(values))).all()) and values.ndim == 1
 
 
-def _data(section: bytes, numbers: NumberStream, tags: Integers) -> tuple[str, Array]:
-    """Return the name and the rows of data, NaN where there are none."""
+class _Head(NamedTuple):
+    """Name of data, number of components, number of rows, and the bytes behind the head."""
+
+    name: str
+    width: int
+    n_rows: int
+    body: bytes
+
+
+def _first_steps(data: bytes, section: bytes, carried: Carried, read: Callable[[_Head], Array]) -> dict[str, Array]:
+    """Return the data of all sections of a name by their own names, of the first time step each."""
+    columns: dict[str, Array] = {}
+    for content in sections(data, section):
+        with carried.optional(f"${section.decode()}"):
+            head = _head(content)
+            values = read(head)
+            if head.name in columns:
+                carried.remarks.append(f"left out a further time step of the data {head.name!r}")
+            else:
+                columns[head.name] = values
+    return grouped_columns(columns)
+
+
+def _head(section: bytes) -> _Head:
+    """Return what the tags of data say: texts, real numbers and integers, each with their number in front."""
     lines = section.split(b"\n")
     at, header = 0, []
     for _ in range(3):  # strings, real numbers, integers
@@ -164,12 +198,39 @@ def _data(section: bytes, numbers: NumberStream, tags: Integers) -> tuple[str, A
     width, count = int(header[2][1]), int(header[2][2])
     if not (0 < width < 100 and 0 <= count <= len(section)):
         raise ValueError(f"malformed: {name!r} declares {count} rows of {width} numbers")
-    given, rows = numbers.of(b"\n".join(lines[at:])).records(count, width)
-    order = np.argsort(given, kind="stable")
-    place = np.minimum(np.searchsorted(given[order], tags), max(count - 1, 0))
-    known = given[order][place] == tags if count else np.zeros(len(tags), dtype=bool)
+    return _Head(name, width, count, b"\n".join(lines[at:]))
+
+
+def _data(numbers: NumberStream, tags: Integers, head: _Head) -> Array:
+    """Return the rows of data, NaN where there are none."""
+    given, rows = numbers.of(head.body).records(head.n_rows, head.width)
+    place, known = _places(given, tags)
     if not known.any():
-        raise ValueError(f"{name!r} has no row for what is in the file")
-    table = np.full((len(tags), width), np.nan)
-    table[known] = rows[order][place[known]]
-    return name, table[:, 0] if width == 1 else table
+        raise ValueError(f"{head.name!r} has no row for what is in the file")
+    table = np.full((len(tags), head.width), np.nan)
+    table[known] = rows[place[known]]
+    return table[:, 0] if head.width == 1 else table
+
+
+def _data_at_corners(numbers: NumberStream, tags: Integers, places: Integers, head: _Head) -> Array:
+    """Return the rows of data at the nodes of elements, NaN where there are none."""
+    table = np.full((int(places.sum(axis=1).max(initial=0)), head.width), np.nan)
+    found = False
+    for given, rows in numbers.of(head.body).blocks(head.n_rows, head.width):
+        place, known = _places(given, tags)
+        found |= bool(known.any())
+        for k in range(rows.shape[1]):
+            chosen = np.flatnonzero(known & (places[:, 1] > k))
+            table[places[chosen, 0] + k] = rows[place[chosen], k]
+    if not found:
+        raise ValueError(f"{head.name!r} has no row for what is in the file")
+    return table[:, 0] if head.width == 1 else table
+
+
+def _places(given: Integers, tags: Integers) -> tuple[Integers, npt.NDArray[np.bool_]]:
+    """Return where tags (n,) are among the given ones (m,), and whether they are."""
+    if len(given) == 0:
+        return np.zeros(len(tags), dtype=np.int64), np.zeros(len(tags), dtype=bool)
+    order = np.argsort(given, kind="stable")
+    place = order[np.minimum(np.searchsorted(given[order], tags), len(given) - 1)]
+    return place, given[place] == tags

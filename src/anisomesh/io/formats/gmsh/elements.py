@@ -3,15 +3,17 @@
 from __future__ import annotations
 
 from collections.abc import Collection
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
 import numpy.typing as npt
 
-from anisomesh.io.carried import Carried, Integers, Marked
+from anisomesh.io.carried import Array, Carried, Integers, Marked
 from anisomesh.io.cells import N_CORNERS, Shape, SurfaceCells
 from anisomesh.io.formats.gmsh.numbers import NumberStream
 from anisomesh.io.formats.words import whole
+from anisomesh.io.polygons import PolygonSoup
 
 TRIANGLE, LINE, POINT = 2, 1, 15  # types of elements of first order
 
@@ -48,7 +50,10 @@ class Elements:
     """
 
     def __init__(self, table: TagTable) -> None:
-        self.cells = SurfaceCells()
+        self._cells = SurfaceCells()  # of numbers of nodes of elements, not of points
+        self._nodes: list[Integers] = [np.zeros(0, dtype=np.int64)]  # point of each node of each element
+        self._n_nodes = 0
+        self._first: list[Integers] = [np.zeros((0, 2), dtype=np.int64)]
         self._table = table
         self._tags: list[tuple[Integers, Integers]] = []  # cells, rows of number, physical group, entity
         self._count = 0
@@ -58,7 +63,7 @@ class Elements:
     def take_numbers(self, count: int) -> Integers:
         """Return numbers (count,) for the next cells of the file, counted from 0."""
         self._count += count
-        return self.cells.take_numbers(count)
+        return self._cells.take_numbers(count)
 
     def add(self, kind: int, nodes: Integers, source: Integers, tags: Integers) -> None:
         """Add elements of a type.
@@ -76,12 +81,9 @@ class Elements:
         """
         self._tags.append((source, tags))
         if kind in _GMSH_SHAPES:
-            self._surface.append(source)
-            shape = _GMSH_SHAPES[kind]
-            nodes_on_sides = _N_NODES[kind] <= 2 * N_CORNERS[shape] + 1
-            self.cells.add(shape, self._table.indices(nodes), source, nodes_on_sides=nodes_on_sides)
+            self._add_surface(kind, self._table.indices(nodes), source)
             return
-        self.cells.ignore(_NAMES[kind], len(nodes))
+        self._cells.ignore(_NAMES[kind], len(nodes))
         if _NAMES[kind] == "line":
             nodes = nodes[:, : 3 if kind == _QUADRATIC_LINE else 2]
             known = self._table.has(nodes).all(axis=1)
@@ -89,6 +91,33 @@ class Elements:
         elif kind == POINT:
             known = self._table.has(nodes[:, 0]) & (tags[:, 1] != 0)
             self._points.add(self._table.indices(nodes[known, 0]), source[known])
+
+    def _add_surface(self, kind: int, points: Integers, source: Integers) -> None:
+        """Add triangles or quadrilaterals of a type, by their points (n, k)."""
+        numbers = self._n_nodes + np.arange(points.size).reshape(points.shape)
+        self._n_nodes += points.size
+        self._nodes.append(points.ravel())
+        self._surface.append(source)
+        self._first.append(np.stack([numbers[:, 0], np.full(len(points), points.shape[1])], axis=1))
+        shape = _GMSH_SHAPES[kind]
+        self._cells.add(shape, numbers, source, nodes_on_sides=_N_NODES[kind] <= 2 * N_CORNERS[shape] + 1)
+
+    def soup(self, points: npt.NDArray[np.float64], carried: Carried, at_nodes: dict[str, Array]) -> PolygonSoup:
+        """Return the elements of the surface as polygons.
+
+        Parameters
+        ----------
+        points
+            The points (V, 3).
+        carried
+            What the file carries besides.
+        at_nodes
+            Data by name with a row for each node of each element, as :attr:`node_places` numbers them, which become
+            corner data.
+        """
+        soup = self._cells.soup(points, carried=carried)
+        carried.corner_data |= {name: values[soup.corners] for name, values in at_nodes.items()}
+        return replace(soup, corners=np.concatenate(self._nodes)[soup.corners])
 
     def carry(self, carried: Carried, named: Collection[str], unlabelled: int) -> Integers:
         """Add lines, points and divisions to what the file carries; return the numbers of the elements (n,).
@@ -114,6 +143,11 @@ class Elements:
     def surface(self) -> Integers:
         """Numbers of the cells of the surface (n,)."""
         return np.concatenate(self._surface)
+
+    @property
+    def node_places(self) -> Integers:
+        """Number of the first node and number of nodes (n, 2) of the cells of the surface."""
+        return np.concatenate(self._first)
 
 
 def entities_of(physical: Integers) -> Integers:

@@ -82,3 +82,51 @@ class NumberStream:
         dtype = np.dtype([("tag", self._order + "i4"), ("xyz", self._order + "f8", (width,))])
         rows = self.take(count * dtype.itemsize, "<i1").view(dtype)
         return rows["tag"].astype(np.int64), rows["xyz"].astype(np.float64)
+
+    def blocks(self, count: int, width: int) -> list[tuple[Integers, npt.NDArray[np.float64]]]:
+        """Return rows of a tag, a number of nodes and ``width`` values for each node, one block for each such number.
+
+        Parameters
+        ----------
+        count
+            How many rows there are.
+        width
+            Number of values of a node.
+
+        Returns
+        -------
+        list
+            Tags (n,) and values (n, k, width) of the rows with k nodes.
+
+        Raises
+        ------
+        ValueError
+            If the rows do not end within the section.
+        """
+        per_value = 2 if self.binary else 1  # integers of 4 bytes in a binary value, words in one of text
+        words = self.take(len(self._bytes) // 4, "<i4") if self.binary else self.take(len(self._bytes.split()), "<f8")
+        first = self._row_starts(words, count, width * per_value)
+        found = []
+        sizes = whole(words[first + 1])
+        for size in np.unique(sizes).tolist():
+            chosen = first[sizes == size]
+            rows = words[chosen[:, None] + 2 + np.arange(size * width * per_value)]
+            values = rows.view(self._order + "f8") if self.binary else rows
+            found.append((whole(words[chosen]), values.astype(np.float64).reshape(len(chosen), size, width)))
+        return found
+
+    @staticmethod
+    def _row_starts(words: npt.NDArray[Any], count: int, per_node: int) -> Integers:
+        """Return where rows of a tag, a number of nodes and ``per_node`` words for each node begin (count,)."""
+        size = int(whole(words[1:2])[0]) if count and len(words) > 1 else 0
+        length = 2 + size * per_node
+        if size > 0 and count * length <= len(words) and (words[1 : count * length : length] == size).all():
+            return np.arange(count) * length
+        first, at = np.zeros(count, dtype=np.int64), 0
+        for k in range(count):
+            size = int(words[at + 1]) if at + 1 < len(words) else 0
+            if size < 1 or at + 2 + size * per_node > len(words):
+                raise ValueError(f"truncated or malformed: row {k + 1} of {count} does not end")
+            first[k] = at
+            at += 2 + size * per_node
+        return first

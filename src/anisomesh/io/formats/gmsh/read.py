@@ -15,6 +15,7 @@ from anisomesh.io.formats.gmsh.data import (
     name_regions,
     read_comments,
     read_data,
+    read_data_at_corners,
     read_entities,
     read_physical_names,
     read_unlabelled,
@@ -55,7 +56,9 @@ def read_msh(data: bytes) -> PolygonSoup:
     read_physical_names(data, carried)
     read_data(data, numbers, carried, (tags, cell_numbers))
     name_regions(carried, named, elements.surface)
-    return elements.cells.soup(points, carried=carried)
+    of_surface = cell_numbers[elements.surface]
+    at_nodes = read_data_at_corners(data, numbers, carried, of_surface, elements.node_places)
+    return elements.soup(points, carried, at_nodes)
 
 
 def _header(data: bytes) -> tuple[str, NumberStream]:

@@ -53,8 +53,10 @@ def msh_bytes(mesh: Mesh, losses: Losses) -> bytes:
         _elements(POINT, vertices.nodes, groups, entities_of(groups), 1 + len(faces) + len(curves.nodes)),
     ]
     n_others = len(curves.nodes) + len(vertices.nodes)
-    point_data = {**mesh.point_data, **continuous_corner_data(mesh, losses)}
-    for name in (*point_data, *mesh.face_data):
+    at_points = continuous_corner_data(mesh, Losses())
+    at_corners = {name: values for name, values in mesh.corner_data.items() if name not in at_points}
+    point_data = {**mesh.point_data, **at_points}
+    for name in (*point_data, *mesh.face_data, *at_corners):
         if _quotable(name) != name:
             losses.changed(name)
     losses.add("materials", *mesh.materials)
@@ -67,6 +69,7 @@ def msh_bytes(mesh: Mesh, losses: Losses) -> bytes:
             b"$Elements\n%d\n" % (len(faces) + n_others) + b"".join(parts) + b"\n$EndElements\n",
             *_data("NodeData", _exact(point_data, "point data", losses), 0),
             *_data("ElementData", {**_exact(mesh.face_data, "face data", losses), **others}, n_others),
+            *_corner_data(_exact(at_corners, "corner data", losses)),
         ]
     )
 
@@ -172,18 +175,41 @@ def _quotable(text: str) -> str:
 
 
 def _data(section: str, data: dict[str, Array], n_others: int) -> list[bytes]:
-    """Return the sections of arrays, with NaN for other elements; of a width that Gmsh does not know by column."""
-    known = {name: rows for name, values in data.items() if _width(rows := flat_rows(values)) in _WIDTHS}
-    columns = separate_columns({name: values for name, values in data.items() if name not in known})
+    """Return the sections of arrays, with NaN for other elements."""
     found = []
-    for name, values in {**known, **columns}.items():
+    for name, values in _of_known_widths(data).items():
         width, count = _width(values), len(values) + n_others
         rows = np.zeros(count, dtype=[("tag", "<i4"), ("values", "<f8", (width,))])
         rows["tag"], rows["values"] = np.arange(1, count + 1), np.nan
         rows["values"][: len(values)] = values.reshape(-1, width)
-        head = f'${section}\n1\n"{_quotable(name)}"\n1\n0\n3\n0\n{width}\n{count}\n'
-        found.append(head.encode() + rows.tobytes() + f"\n$End{section}\n".encode())
+        found.append(_section(section, name, width, rows))
     return found
+
+
+def _corner_data(data: dict[str, Array]) -> list[bytes]:
+    """Return the sections of arrays at the corners of the faces (F, 3, ...)."""
+    at_corners = {name: values.reshape(-1, *values.shape[2:]) for name, values in data.items()}
+    found = []
+    for name, values in _of_known_widths(at_corners).items():
+        count, width = len(values) // 3, _width(values)
+        rows = np.zeros(count, dtype=[("tag", "<i4"), ("nodes", "<i4"), ("values", "<f8", (3 * width,))])
+        rows["tag"], rows["nodes"] = np.arange(1, count + 1), 3
+        rows["values"] = values.reshape(count, 3 * width)
+        found.append(_section("ElementNodeData", name, width, rows))
+    return found
+
+
+def _of_known_widths(data: dict[str, Array]) -> dict[str, Array]:
+    """Return arrays (n,) or (n, k) of a width that Gmsh knows; others as one for each column."""
+    known = {name: rows for name, values in data.items() if _width(rows := flat_rows(values)) in _WIDTHS}
+    columns = separate_columns({name: values for name, values in data.items() if name not in known})
+    return {**known, **columns}
+
+
+def _section(section: str, name: str, width: int, rows: Array) -> bytes:
+    """Return a section of rows of ``width`` components."""
+    head = f'${section}\n1\n"{_quotable(name)}"\n1\n0\n3\n0\n{width}\n{len(rows)}\n'
+    return head.encode() + rows.tobytes() + f"\n$End{section}\n".encode()
 
 
 def _width(values: Array) -> int:

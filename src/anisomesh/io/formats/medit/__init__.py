@@ -1,1 +1,1 @@
-"""The text files of MEDIT (.mesh)."""
+"""The files of MEDIT: meshes (.mesh, .meshb) and solutions (.sol, .solb)."""

@@ -1,79 +1,70 @@
-"""MEDIT's text files of solutions (.sol): values at the vertices of a mesh, without the mesh.
+"""MEDIT's files of solutions (.sol, .solb): values at the vertices of a mesh, without the mesh.
 
 Format: the keyword ``SolAtVertices`` of libMeshb, https://github.com/LoicMarechal/libMeshb, as Mmg reads and writes it.
 """
 
 from __future__ import annotations
 
-import re
-
 import numpy as np
 import numpy.typing as npt
 
 from anisomesh.io.carried import Array
-from anisomesh.io.formats.words import format_rows
+from anisomesh.io.formats.medit.content import Rows, binary_content, of_reals, text_content
+from anisomesh.io.formats.medit.sections import PLANE, SPACE, Section, read_sections
 
-PLANE = 2  # dimension of files whose points have two coordinates
+_SECTION = "SolAtVertices"
 _SCALAR, _VECTOR, _TENSOR = 1, 2, 3  # types of fields
-_LOWER = {2: [(0, 0), (0, 1), (1, 1)], 3: [(0, 0), (0, 1), (1, 1), (0, 2), (1, 2), (2, 2)]}  # rows of the lower half
-_BINARY = (b"\x01\x00\x00\x00", b"\x00\x00\x00\x01")  # the number 1 in either byte order
+_LOWER = {
+    PLANE: [(0, 0), (0, 1), (1, 1)],
+    SPACE: [(0, 0), (0, 1), (1, 1), (0, 2), (1, 2), (2, 2)],
+}  # rows of the lower half
 
 
 def read_sol(data: bytes) -> list[Array]:
     """Return the fields at vertices, in order: scalars (V,), vectors (V, 2) or (V, 3), symmetric tensors (V, 3, 3).
 
+    Parameters
+    ----------
+    data
+        The content of the file, text or binary.
+
     Raises
     ------
     ValueError
-        If the file is binary, cut off or malformed, or has no field at vertices.
+        If the file is cut off or malformed, or has no field at vertices.
 
     Notes
     -----
     A row of a tensor is m11 m12 m22 m13 m23 m33. Tensors of the plane, m11 m12 m22, get the mean of m11 and m22 for
     m33, which no edge in the plane z = 0 feels.
     """
-    if data.startswith(_BINARY):
-        raise ValueError("it is binary; save it as text, a .sol file beside a .mesh file")
-    tokens = _without_comments(data).split()
-    if not tokens or not tokens[0].startswith(b"MeshVersionFormatted"):
-        raise ValueError("it does not begin with MeshVersionFormatted as a MEDIT text file does")
-    words = [k for k, token in enumerate(tokens) if token[:1].isalpha() and token.lower() not in (b"nan", b"inf")]
-    sections = {tokens[k]: tokens[k + 1 : end] for k, end in zip(words, [*words[1:], len(tokens)], strict=True)}
-    dimension = sol_dimension(data)
-    if dimension not in _LOWER:
-        raise ValueError(f"its dimension is {dimension}; expected 2 or 3")
-    if b"SolAtVertices" not in sections:
-        raise ValueError("it has no section SolAtVertices, the values at vertices")
-    return _fields(sections[b"SolAtVertices"], dimension)
+    found = read_sections(data)
+    section = found.named(_SECTION)
+    if section is None:
+        raise ValueError(f"it has no section {_SECTION}, the values at vertices")
+    return _fields(section, found.dimension)
 
 
 def sol_dimension(data: bytes) -> int:
-    """Return the dimension that a file declares, 3 if it declares none."""
-    found = re.search(rb"\bDimension\s+(\d+)", _without_comments(data))
-    return 3 if found is None else int(found[1])
+    """Return the number of coordinates that a file declares, 3 if it declares none."""
+    return read_sections(data).dimension
 
 
-def _without_comments(data: bytes) -> bytes:
-    return re.sub(rb"#[^\n]*", b"", data)
-
-
-def _fields(body: list[bytes], dimension: int) -> list[Array]:
+def _fields(section: Section, dimension: int) -> list[Array]:
     """Return the fields of a section: a count, the number of fields, their types, and the rows."""
-    lower = _LOWER[dimension]
-    widths = {_SCALAR: 1, _VECTOR: dimension, _TENSOR: len(lower)}
-    try:
-        count, n_fields = map(int, body[:2])
-        types = [int(word) for word in body[2 : 2 + n_fields]]
-        rows = np.array(list(map(float, body[2 + n_fields :])), dtype=np.float64)
-    except ValueError as error:
-        raise ValueError(f"truncated or malformed: the section SolAtVertices: {error}") from None
-    if len(types) < n_fields or not types or not set(types) <= set(widths):
+    widths = {_SCALAR: 1, _VECTOR: dimension, _TENSOR: len(_LOWER[dimension])}
+    count, n_fields = section.count(), section.types(1)[0]
+    types = section.types(n_fields)
+    if not types or not set(types) <= set(widths):
         raise ValueError(f"its fields are of types {types}; expected 1 (scalar), 2 (vector) or 3 (symmetric tensor)")
     width = sum(widths[kind] for kind in types)
-    if len(rows) != count * width or count < 1:
-        raise ValueError(f"truncated: SolAtVertices declares {count} rows of {width} but {len(rows)} numbers follow")
+    if count < 1:
+        raise ValueError(f"truncated: {_SECTION} declares {count} rows")
+    rows = section.rows(count, width, 0)
+    if section.n_left:
+        raise ValueError(f"malformed: more than the {count} rows of {width} numbers that {_SECTION} declares follow")
     ends = np.cumsum([widths[kind] for kind in types])
-    parts = np.split(rows.reshape(count, width), ends[:-1], axis=1)
+    parts = np.split(rows, ends[:-1], axis=1)
     read = {_SCALAR: lambda part: part[:, 0], _VECTOR: lambda part: part, _TENSOR: _tensors}
     return [read[kind](part) for kind, part in zip(types, parts, strict=True)]
 
@@ -81,16 +72,24 @@ def _fields(body: list[bytes], dimension: int) -> list[Array]:
 def _tensors(rows: npt.NDArray[np.float64]) -> npt.NDArray[np.float64]:
     """Return tensors (V, 3, 3) of the lower halves (V, 3) or (V, 6)."""
     tensors = np.zeros((len(rows), 3, 3))
-    dimension = 2 if rows.shape[1] == len(_LOWER[2]) else 3
+    dimension = PLANE if rows.shape[1] == len(_LOWER[PLANE]) else SPACE
     for column, (i, j) in enumerate(_LOWER[dimension]):
         tensors[:, i, j] = tensors[:, j, i] = rows[:, column]
-    if dimension == 2:
+    if dimension == PLANE:
         tensors[:, 2, 2] = 0.5 * (rows[:, 0] + rows[:, 2])
     return tensors
 
 
 def sol_bytes(tensors: npt.NDArray[np.float64]) -> bytes:
-    """Return the content of a file with one field of symmetric tensors (V, 3, 3), exact in float64."""
-    rows = np.stack([tensors[:, i, j] for i, j in _LOWER[3]], axis=1)
-    head = f"MeshVersionFormatted 2\nDimension 3\nSolAtVertices\n{len(rows)}\n1 {_TENSOR}\n"
-    return (head + format_rows("%r %r %r %r %r %r\n", rows) + "End\n").encode()
+    """Return the content of a text file with one field of symmetric tensors (V, 3, 3), exact in float64."""
+    return text_content([_rows(tensors)])
+
+
+def solb_bytes(tensors: npt.NDArray[np.float64]) -> bytes:
+    """Return the content of a binary file with one field of symmetric tensors (V, 3, 3), exact in float64."""
+    return binary_content([_rows(tensors)])
+
+
+def _rows(tensors: npt.NDArray[np.float64]) -> Rows:
+    lower = np.stack([tensors[:, i, j] for i, j in _LOWER[SPACE]], axis=1)
+    return of_reals(_SECTION, lower, types=(_TENSOR,))

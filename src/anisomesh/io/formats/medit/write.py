@@ -1,13 +1,13 @@
-"""Writing of MEDIT's text files, version 2 (float64)."""
+"""Writing of MEDIT's mesh files, text and binary, in float64."""
 
 from __future__ import annotations
 
 import numpy as np
 
-from anisomesh.attributes.model import Mesh, Regions
-from anisomesh.io.carried import NORMAL, Array, Integers
+from anisomesh.attributes.model import Mesh
+from anisomesh.io.carried import NORMAL, Array
+from anisomesh.io.formats.medit.content import Rows, binary_content, of_integers, of_reals, text_content
 from anisomesh.io.formats.medit.read import REFERENCE
-from anisomesh.io.formats.words import format_rows
 from anisomesh.io.holding import (
     OF_FEATURES,
     OF_FIXED_POINTS,
@@ -19,7 +19,17 @@ from anisomesh.io.holding import (
 
 
 def medit_bytes(mesh: Mesh, losses: Losses) -> bytes:
-    """Return the content of a MEDIT file.
+    """Return the content of a text file."""
+    return text_content(_sections(mesh, losses))
+
+
+def meditb_bytes(mesh: Mesh, losses: Losses) -> bytes:
+    """Return the content of a binary file."""
+    return binary_content(_sections(mesh, losses))
+
+
+def _sections(mesh: Mesh, losses: Losses) -> list[Rows]:
+    """Return the sections of a mesh.
 
     Notes
     -----
@@ -47,48 +57,38 @@ def medit_bytes(mesh: Mesh, losses: Losses) -> bytes:
     losses.add("point data", *point_data)
     losses.add("face data", *mesh.face_data)
     losses.add("materials", *mesh.materials)
-    return "".join(
-        [
-            f"MeshVersionFormatted 2\nDimension 3\nVertices\n{len(points)}\n",
-            _lines("%r %r %r %d\n", points, vertices),
-            f"Triangles\n{len(faces)}\n",
-            _lines("%d %d %d %d\n", faces + 1, references),
-            _edges(mesh.features, held_division(mesh.feature_regions, OF_FEATURES, losses, REFERENCE)),
-            _points(mesh.fixed_points),
-            _normals(normals, losses),
-            "End\n",
-        ]
-    ).encode()
+    return [
+        of_reals("Vertices", points, vertices),
+        of_integers("Triangles", faces + 1, references),
+        *_edges(mesh, losses),
+        *_fixed_points(mesh),
+        *_normals(normals, losses),
+    ]
 
 
-def _lines(pattern: str, rows: Array, references: Integers) -> str:
-    """Return rows, each with a reference."""
-    columns = [*rows.T.tolist(), references.tolist()]
-    return "".join(map(pattern.__mod__, zip(*columns, strict=True)))
+def _edges(mesh: Mesh, losses: Losses) -> list[Rows]:
+    """Return the features as required edges, with their references."""
+    division = held_division(mesh.feature_regions, OF_FEATURES, losses, REFERENCE)
+    count = len(mesh.features)
+    if count == 0:
+        return []
+    references = np.zeros(count, dtype=np.int64) if division is None else division.labels
+    numbers = np.arange(1, count + 1)
+    return [of_integers("Edges", mesh.features + 1, references), of_integers("RequiredEdges", numbers)]
 
 
-def _edges(features: Integers, division: Regions | None) -> str:
-    if len(features) == 0:
-        return ""
-    edges = _lines("%d %d %d\n", features + 1, np.zeros(len(features), int) if division is None else division.labels)
-    required = format_rows("%d\n", np.arange(1, len(features) + 1))
-    return f"Edges\n{len(features)}\n{edges}RequiredEdges\n{len(features)}\n{required}"
+def _fixed_points(mesh: Mesh) -> list[Rows]:
+    """Return the fixed points as corners and required vertices."""
+    names = ("Corners", "RequiredVertices") if len(mesh.fixed_points) else ()
+    return [of_integers(name, mesh.fixed_points + 1) for name in names]
 
 
-def _points(fixed_points: Integers) -> str:
-    if len(fixed_points) == 0:
-        return ""
-    numbers = f"{len(fixed_points)}\n" + format_rows("%d\n", fixed_points + 1)
-    return f"Corners\n{numbers}RequiredVertices\n{numbers}"
-
-
-def _normals(normals: Array | None, losses: Losses) -> str:
+def _normals(normals: Array | None, losses: Losses) -> list[Rows]:
+    """Return a normal for each vertex."""
     if normals is None:
-        return ""
+        return []
     if normals.dtype.kind != "f" or normals.shape[1:] != (3,):
         losses.add("point data", NORMAL)
-        return ""
+        return []
     numbers = np.arange(1, len(normals) + 1)
-    places = format_rows("%d %d\n", np.stack([numbers, numbers], axis=1))
-    rows = format_rows("%r %r %r\n", normals.astype(np.float64))
-    return f"Normals\n{len(normals)}\n{rows}NormalAtVertices\n{len(normals)}\n{places}"
+    return [of_reals("Normals", normals), of_integers("NormalAtVertices", numbers, numbers)]

@@ -6,7 +6,7 @@ import numpy as np
 
 from anisomesh.io.carried import COLOUR, NORMAL, UV, Array, Carried, Integers
 from anisomesh.io.formats.obj.lines import Lines
-from anisomesh.io.formats.region_names import divide
+from anisomesh.io.formats.region_names import divide, numbered_regions
 from anisomesh.io.formats.words import LINES_AT_ONCE, quick_numbers, word_starts
 
 SMOOTHING = "smoothing_group"
@@ -14,6 +14,9 @@ SMOOTHING = "smoothing_group"
 
 DIVISIONS = {"object": b"o", "group": b"g", "material": b"usemtl"}
 """The words that begin the regions of divisions."""
+
+OF_LINES = ("object", "group")
+"""The divisions that lines have too."""
 
 LIBRARIES = "mtllib"
 """Key of the names of the material files."""
@@ -131,16 +134,32 @@ def take_divisions(file: Lines, carried: Carried) -> None:
 
 
 def take_lines(file: Lines, carried: Carried) -> None:
-    """Add lines as features and points as fixed points."""
-    for word, fewest in ((b"l", 2), (b"p", 1)):
-        for k in file.of(word):
-            with carried.optional(f"line {k + 1}"):
-                before = int(np.searchsorted(file.point_lines, k))
-                raw = [int(text.partition(b"/")[0]) for text in file.lines[k].partition(b"#")[0].split()[1:]]
-                points = np.array([n - 1 if n > 0 else n + before for n in raw], dtype=np.int64)
-                if len(points) < fewest or 0 in raw or (points < 0).any() or (points >= len(file.point_lines)).any():
-                    raise ValueError(f"it reads {file.lines[k][:40]!r}")
-                if word == b"l":
-                    carried.lines.add(np.stack([points[:-1], points[1:]], axis=1))
-                else:
-                    carried.fixed_points.add(points)
+    """Add lines as features, with the objects and groups that they are in, and points as fixed points."""
+    given = file.of(b"l")
+    for number, k in enumerate(given.tolist()):
+        with carried.optional(f"line {k + 1}"):
+            points = _points_of_line(file, k, 2)
+            block = np.stack([points[:-1], points[1:]], axis=1)
+            carried.lines.add(block, np.full(len(block), number))
+    for k in file.of(b"p").tolist():
+        with carried.optional(f"line {k + 1}"):
+            carried.fixed_points.add(_points_of_line(file, k, 1))
+    for name in OF_LINES if len(given) else ():
+        with carried.optional(f"the {name}s of lines"):
+            begin = file.of(DIVISIONS[name])
+            texts = np.array(["", *(file.rest(k) for k in begin)], dtype=object)[np.searchsorted(begin, given)]
+            used = [text for text in dict.fromkeys(texts.tolist()) if text]
+            labels, names = numbered_regions(used, range(1, len(used) + 1))
+            label_of = {"": 0, **dict(zip(used, labels, strict=True))}
+            carried.lines.divide(name, np.array([label_of[text] for text in texts.tolist()]), names)
+
+
+def _points_of_line(file: Lines, number: int, fewest: int) -> Integers:
+    """Return the points of a line that lists them, from 0; ValueError if they are fewer or are not in the file."""
+    line = file.lines[number]
+    before = int(np.searchsorted(file.point_lines, number))
+    raw = [int(text.partition(b"/")[0]) for text in line.partition(b"#")[0].split()[1:]]
+    points = np.array([n - 1 if n > 0 else n + before for n in raw], dtype=np.int64)
+    if len(points) < fewest or 0 in raw or (points < 0).any() or (points >= len(file.point_lines)).any():
+        raise ValueError(f"it reads {line[:40]!r}")
+    return points

@@ -2,18 +2,20 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from itertools import pairwise
 
 import numpy as np
 
-from anisomesh.attributes.model import Mesh
+from anisomesh.attributes.model import Mesh, Regions
 from anisomesh.io.carried import COLOUR, NORMAL, UV, Array, Integers
-from anisomesh.io.formats.obj.attributes import DIVISIONS, SMOOTHING
+from anisomesh.io.formats.obj.attributes import DIVISIONS, OF_LINES, SMOOTHING
 from anisomesh.io.formats.region_names import in_words, region_texts
 from anisomesh.io.formats.words import format_rows
-from anisomesh.io.holding import Losses, main_division
+from anisomesh.io.holding import OF_FEATURES, OF_FIXED_POINTS, Losses, main_division
 
-_FREE = ("object", "group")  # words that take a division that OBJ does not know
+States = list[tuple[str, Integers, dict[int, str]]]
+"""What changes between elements: the word, the label of each element (n,), and the text for each label."""
 
 
 def obj_bytes(mesh: Mesh, losses: Losses) -> bytes:
@@ -22,7 +24,8 @@ def obj_bytes(mesh: Mesh, losses: Losses) -> bytes:
     Notes
     -----
     Regions keep their names, not their numbers. Faces are in the order of their regions if they would change back and
-    forth between them otherwise.
+    forth between them otherwise. Features that are in no region are in front of the faces, in front of the first
+    group.
     """
     faces = mesh.surface.faces
     lines = [_points(mesh)]
@@ -33,15 +36,19 @@ def obj_bytes(mesh: Mesh, losses: Losses) -> bytes:
         if rows is not None:
             lines.append(format_rows(word + " %r" * rows.shape[1] + "\n", rows))
     states = _states(mesh, losses)
-    lines.append(_faces(columns, states, len(faces)))
-    lines.append(format_rows("l %d %d\n", mesh.features + 1))
+    of_lines = _states_of_lines(mesh, states, losses)
+    is_labelled = np.any([np.zeros(len(mesh.features), dtype=bool), *(state[1] != 0 for state in of_lines)], axis=0)
+    lines.append(format_rows("l %d %d\n", mesh.features[~is_labelled] + 1))
+    lines.append(_in_states(_pattern_of_faces(columns), _table_of_faces(columns, len(faces)), states))
+    labelled = [(word, labels[is_labelled], texts) for word, labels, texts in of_lines]
+    lines.append(_in_states("l %d %d\n", mesh.features[is_labelled] + 1, labelled))
     lines.append(format_rows("p %d\n", mesh.fixed_points + 1))
     held = [name for name, numbers in zip((UV, NORMAL), columns[1:], strict=True) if numbers is not None]
     losses.add("corner data", *(name for name in mesh.corner_data if name not in held))
     held += [] if _colours(mesh) is None else [COLOUR]
     losses.add("point data", *(name for name in mesh.point_data if name not in held))
     losses.add("materials", *(name for name in mesh.materials if name != "obj"))
-    losses.divisions_of_features(mesh)
+    losses.add(OF_FIXED_POINTS, *mesh.fixed_point_regions)
     return "".join(lines).encode("utf-8", errors="replace")
 
 
@@ -77,18 +84,12 @@ def _at_corners(mesh: Mesh, name: str, widths: tuple[int, ...]) -> tuple[Array |
     return rows, numbers.reshape(-1, 3).astype(np.int64) + 1
 
 
-def _states(mesh: Mesh, losses: Losses) -> list[tuple[str, Integers, dict[int, str]]]:
-    """Return what changes between faces: the word, the label of each face (F,), and the text for each label."""
-    regions = dict(mesh.regions)
-    found = {name: regions.pop(name) for name in DIVISIONS if name in regions}
-    for slot in _FREE:
-        other = main_division(regions)
-        if slot not in found and other is not None:
-            found[slot] = regions.pop(other[0])
-    losses.add("regions", *regions)
+def _states(mesh: Mesh, losses: Losses) -> States:
+    """Return what changes between faces."""
+    found = _in_slots(mesh.regions, tuple(DIVISIONS), "regions", losses)
     states = [
-        (word.decode(), found[name].labels, region_texts(found[name], losses, in_words, distinct=True))
-        for name, word in DIVISIONS.items()
+        (DIVISIONS[name].decode(), found[name].labels, region_texts(found[name], losses, in_words, distinct=True))
+        for name in DIVISIONS
         if name in found
     ]
     smoothing = mesh.face_data.get(SMOOTHING)
@@ -100,14 +101,56 @@ def _states(mesh: Mesh, losses: Losses) -> list[tuple[str, Integers, dict[int, s
     return states
 
 
-def _faces(columns: list[Integers | None], states: list[tuple[str, Integers, dict[int, str]]], count: int) -> str:
-    """Return the lines of faces, with a line wherever a state changes."""
+def _states_of_lines(mesh: Mesh, of_faces: States, losses: Losses) -> States:
+    """Return what changes between features; a word without a text where they are in no region."""
+    given = {name: division for name, division in mesh.feature_regions.items() if division.labels.any()}
+    found = _in_slots(given, OF_LINES, OF_FEATURES, losses)
+    words_of_faces = {word for word, _, _ in of_faces}
+    states: States = []
+    for name in OF_LINES:
+        word = DIVISIONS[name].decode()
+        if name in found:
+            states.append((word, found[name].labels, {0: ""} | _texts_of_lines(found[name], losses)))
+        elif found and word in words_of_faces:  # which would go on
+            states.append((word, np.zeros(len(mesh.features), dtype=np.int64), {0: ""}))
+    return states
+
+
+def _texts_of_lines(division: Regions, losses: Losses) -> dict[int, str]:
+    """Return the text of each region of features."""
+    in_regions = Regions(division.labels[division.labels != 0], division.names)
+    return region_texts(in_regions, losses, in_words, distinct=True)
+
+
+def _in_slots(regions: Mapping[str, Regions], slots: tuple[str, ...], what: str, losses: Losses) -> dict[str, Regions]:
+    """Return the divisions that OBJ knows, and others in the place of objects and groups; the rest is lost."""
+    others = dict(regions)
+    found = {name: others.pop(name) for name in slots if name in others}
+    for slot in OF_LINES:
+        other = main_division(others)
+        if slot not in found and other is not None:
+            found[slot] = others.pop(other[0])
+    losses.add(what, *others)
+    return found
+
+
+def _pattern_of_faces(columns: list[Integers | None]) -> str:
+    """Return the pattern of a line of a face."""
     _, of_texture, of_normal = columns
     corner = "%d" + ("/%d" if of_texture is not None else "/" if of_normal is not None else "")
     corner += "/%d" if of_normal is not None else ""
-    pattern = f"f {corner} {corner} {corner}\n"
-    table = np.stack([column for column in columns if column is not None], axis=2).reshape(count, -1)
-    if not states:
+    return f"f {corner} {corner} {corner}\n"
+
+
+def _table_of_faces(columns: list[Integers | None], count: int) -> Integers:
+    """Return the numbers in the lines of faces (F, k)."""
+    return np.stack([column for column in columns if column is not None], axis=2).reshape(count, -1)
+
+
+def _in_states(pattern: str, table: Integers, states: States) -> str:
+    """Return the lines of elements, with a line wherever a state changes."""
+    count = len(table)
+    if not states or count == 0:
         return format_rows(pattern, table)
     labels = np.stack([state[1] for state in states], axis=1)
     order = np.arange(count)
@@ -122,7 +165,7 @@ def _faces(columns: list[Integers | None], states: list[tuple[str, Integers, dic
         now = labels[order[first]].tolist()
         for k, (word, _, texts) in enumerate(states):
             if now[k] != before[k] and not (before[k] is None and word == "s" and now[k] == 0):
-                lines.append(f"{word} {texts[now[k]]}\n")
+                lines.append(f"{word} {texts[now[k]]}".rstrip() + "\n")
                 before[k] = now[k]
         lines.append(format_rows(pattern, table[order[first:end]]))
     return "".join(lines)

@@ -20,6 +20,9 @@ _BYTE_ORDERS = {"ascii": "", "binary_little_endian": "<", "binary_big_endian": "
 REGIONS = "regions"
 """First word of comments that make a property of faces a division: its name, a label, and the name of the label."""
 
+EDGE_REGIONS = "edge_regions"
+"""First word of comments that do so for a property of edges."""
+
 NAME = "name"
 """First word of comments that give data a name that is not one word: the element, the property, and the name."""
 

@@ -6,10 +6,10 @@ from typing import Any
 
 import numpy as np
 
-from anisomesh.io.carried import COLOUR, NORMAL, UV, Array, Carried, Integers, grouped_columns
+from anisomesh.io.carried import COLOUR, NORMAL, UV, Array, Carried, Integers, grouped_columns, is_region
 from anisomesh.io.cells import SurfaceCells, strip_triangles
 from anisomesh.io.formats.ply.body import BinaryBody, PropertyValues, TextBody
-from anisomesh.io.formats.ply.header import NAME, REGIONS, TEXTURE_FILE, Element, read_header
+from anisomesh.io.formats.ply.header import EDGE_REGIONS, NAME, REGIONS, TEXTURE_FILE, Element, read_header
 from anisomesh.io.formats.region_names import unquoted
 from anisomesh.io.formats.words import whole
 from anisomesh.io.polygons import PolygonSoup
@@ -42,7 +42,8 @@ def read_ply(data: bytes) -> PolygonSoup:
 
     Notes
     -----
-    The element ``edge`` gives features. Lists of faces with as many values for each corner are corner data.
+    The element ``edge`` gives features; its integers are divisions of these if a comment says so or they are called as
+    divisions usually are. Lists of faces with as many values for each corner are corner data.
     """
     header = read_header(data)
     if not any(element.name == "vertex" for element in header.elements):
@@ -62,10 +63,7 @@ def read_ply(data: bytes) -> PolygonSoup:
                 _add(cells, element.name, corners)
                 _add_face_data(element, columns, corners, carried)
         elif element.name == "edge" and {"vertex1", "vertex2"} <= columns.keys():
-            ends = [columns.pop(name).values.astype(np.int64) for name in ("vertex1", "vertex2")]
-            carried.lines.add(np.stack(ends, axis=1))
-            if columns:
-                carried.remarks.append(f"left out the properties {', '.join(columns)} of edges")
+            _add_edges(element, columns, header.comments, carried)
         elif element.count:
             carried.remarks.append(f"left out {element.count} x {element.name}")
     _take_comments(header.comments, carried)
@@ -126,6 +124,21 @@ def _add_face_data(element: Element, columns: Columns, corners: PropertyValues, 
         carried.add_cell_data(name, rows)
 
 
+def _add_edges(element: Element, columns: Columns, comments: list[str], carried: Carried) -> None:
+    """Add edges, and the regions that they are in."""
+    ends = [columns.pop(name).values.astype(np.int64) for name in ("vertex1", "vertex2")]
+    carried.lines.add(np.stack(ends, axis=1), np.arange(element.count))
+    said = [words for words in (line.split(maxsplit=3) for line in comments) if words[:1] == [EDGE_REGIONS]]
+    integers = {prop.name for prop in element.properties if prop.type[0] in "iu" and not prop.count_type}
+    divisions = {words[1] for words in said if len(words) > 1} | {name for name in integers if is_region(name)}
+    for name in [name for name in columns if name in divisions]:
+        with carried.optional(f"the regions {name!r} of edges"):
+            names = {int(words[2]): unquoted(words[3]) for words in said if words[1:2] == [name] and len(words) == 4}
+            carried.lines.divide(name, whole(columns.pop(name).values), names)
+    if columns:
+        carried.remarks.append(f"left out the properties {', '.join(columns)} of edges")
+
+
 def _arrays(element: Element, columns: Columns, carried: Carried) -> dict[str, Array]:
     """Return scalars and lists of equal length of the properties of an element as arrays."""
     scalars: dict[str, Array] = {}
@@ -167,8 +180,12 @@ def _take_comments(comments: list[str], carried: Carried) -> None:
     for line in comments:
         words = line.split(maxsplit=3)
         if len(words) == 4 and words[0] == NAME:
-            at_faces = (carried.cell_data, carried.corner_data, carried.divisions)
-            for data in (carried.point_data,) if words[1] == "vertex" else at_faces:
+            named: dict[str, tuple[dict[str, Any], ...]] = {
+                "vertex": (carried.point_data,),
+                "face": (carried.cell_data, carried.corner_data, carried.divisions),
+                "edge": (carried.lines.divisions,),
+            }
+            for data in named.get(words[1], ()):
                 _rename(data, words[2], unquoted(words[3]))
 
 

@@ -6,11 +6,20 @@ from collections.abc import Mapping
 
 import numpy as np
 
-from anisomesh.attributes.model import Mesh
+from anisomesh.attributes.model import Mesh, Regions
 from anisomesh.io.carried import COLOUR, NORMAL, UV, Array, separate_columns
-from anisomesh.io.formats.ply.header import NAME, PLY_TYPES, REGIONS, TEXTURE_FILE
+from anisomesh.io.formats.ply.header import EDGE_REGIONS, NAME, PLY_TYPES, REGIONS, TEXTURE_FILE
 from anisomesh.io.formats.region_names import quoted
-from anisomesh.io.holding import Losses, flat_rows, is_exact_in_float64, numeric, regions_as_integers
+from anisomesh.io.holding import (
+    OF_FEATURES,
+    OF_FIXED_POINTS,
+    Losses,
+    flat_rows,
+    is_exact_in_float64,
+    narrowed,
+    numeric,
+    regions_as_integers,
+)
 
 _COLUMNS = {  # names of the columns of arrays, by name and width
     (COLOUR, 3): ("red", "green", "blue"),
@@ -30,7 +39,8 @@ def ply_bytes(mesh: Mesh, losses: Losses) -> bytes:
     Notes
     -----
     Arrays (n, k) are k properties; colours, normals and texture coordinates have their usual names. Corner data are
-    lists of faces, features are the element ``edge``. Regions are integers of faces, with their names in comments.
+    lists of faces, features are the element ``edge``. Regions are integers of faces and edges, with their names in
+    comments.
     """
     surface = mesh.surface
     vertex = {name: surface.points[:, k] for k, name in enumerate("xyz")}
@@ -45,16 +55,22 @@ def ply_bytes(mesh: Mesh, losses: Losses) -> bytes:
     losses.add("materials", *(name for name in mesh.materials if name != "texture_files"))
     if len(mesh.fixed_points):
         losses.say(f"{len(mesh.fixed_points)} fixed point(s)")
-    losses.divisions_of_features(mesh)
+    losses.add(OF_FIXED_POINTS, *mesh.fixed_point_regions)
+    edge = {"vertex1": mesh.features[:, 0].astype(np.int32), "vertex2": mesh.features[:, 1].astype(np.int32)}
+    labels = {name: narrowed(division.labels) for name, division in mesh.feature_regions.items()}
+    _add_columns(edge, labels if len(mesh.features) else {}, OF_FEATURES, losses)
     elements = [
         ("vertex", vertex, {}),
         ("face", {name: values for name, values in face.items() if name != "vertex_indices"}, lists),
     ]
     if len(mesh.features):
-        ends = mesh.features.astype(np.int32)
-        elements.append(("edge", {"vertex1": ends[:, 0], "vertex2": ends[:, 1]}, {}))
+        elements.append(("edge", edge, {}))
+    names = [
+        *_names_of_regions(REGIONS, mesh.regions, face),
+        *_names_of_regions(EDGE_REGIONS, mesh.feature_regions, edge),
+    ]
     header, body = ["ply", "format binary_little_endian 1.0"], []
-    header += [f"comment {line}" for line in (*comments, *_names_of_data(mesh), *_names_of_regions(mesh, face))]
+    header += [f"comment {line}" for line in (*comments, *_names_of_data(mesh), *names)]
     for name, scalars, of_lists in elements:
         lines, rows = _element(scalars, of_lists)
         header += [f"element {name} {len(rows)}", *lines]
@@ -116,20 +132,24 @@ def _element(scalars: Mapping[str, Array], lists: Mapping[str, Array]) -> tuple[
     return lines, rows
 
 
-def _names_of_regions(mesh: Mesh, face: Mapping[str, Array]) -> list[str]:
-    """Return the comments that tell which properties of faces are divisions, and the names of their labels."""
+def _names_of_regions(word: str, regions: Mapping[str, Regions], columns: Mapping[str, Array]) -> list[str]:
+    """Return the comments that tell which properties of an element are divisions, and the names of their labels."""
     lines = []
-    for name, division in mesh.regions.items():
-        if _word(name) in face:
-            lines.append(f"{REGIONS} {_word(name)}")
+    for name, division in regions.items():
+        if _word(name) in columns:
+            lines.append(f"{word} {_word(name)}")
             names = {label: text for label, text in division.names.items() if text}
-            lines += [f"{REGIONS} {_word(name)} {label} {quoted(text)}" for label, text in names.items()]
+            lines += [f"{word} {_word(name)} {label} {quoted(text)}" for label, text in names.items()]
     return lines
 
 
 def _names_of_data(mesh: Mesh) -> list[str]:
     """Return the comments that give data and divisions the names that are not one word."""
-    of_elements = (("vertex", mesh.point_data), ("face", {**mesh.face_data, **mesh.corner_data, **mesh.regions}))
+    of_elements: tuple[tuple[str, Mapping[str, object]], ...] = (
+        ("vertex", mesh.point_data),
+        ("face", {**mesh.face_data, **mesh.corner_data, **mesh.regions}),
+        ("edge", mesh.feature_regions),
+    )
     return [
         f"{NAME} {element} {_word(name)} {quoted(name)}"
         for element, data in of_elements

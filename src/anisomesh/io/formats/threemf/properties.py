@@ -1,35 +1,26 @@
-"""Materials and colours of the triangles of 3MF."""
+"""Materials, colours and texture coordinates of the triangles of 3MF."""
 
 from __future__ import annotations
 
-from typing import Protocol
+from pathlib import PurePosixPath
 
 import numpy as np
 
-from anisomesh.io.carried import COLOUR, Carried, Integers
+from anisomesh.io.carried import COLOUR, UV, Array, Carried, Integers
 from anisomesh.io.formats.region_names import divide
+from anisomesh.io.formats.threemf.resources import NONE, TEXTURE_ATTRIBUTES, Resources
 
-OBJECT, MATERIAL = "object", "material"
-"""Names of the divisions into objects and into base materials."""
+OBJECT, MATERIAL, TEXTURE = "object", "material", "texture"
+"""Names of the divisions into objects, base materials and textures."""
 
-NONE = -1
-"""No group or member of properties."""
+TEXTURES = "textures"
+"""Key of the textures by their labels: tables with the content of the image as ``data``, and its attributes."""
 
 _WHITE = (255, 255, 255, 255)
 
 
-class _Groups(Protocol):
-    groups: dict[int, list[tuple[str, str]]]
-    colours: dict[int, list[str]]
-
-
-def number(text: str) -> int:
-    """Return the number of a group or a member, :data:`NONE` for other text."""
-    return int(text) if text.isdecimal() and len(text) < 18 else NONE
-
-
 class Properties:
-    """Collects the objects of triangles, their materials and the colours of their corners."""
+    """Collects the objects of triangles, their materials, and colours and texture coordinates of their corners."""
 
     def __init__(self) -> None:
         self._names: list[str] = []
@@ -37,8 +28,11 @@ class Properties:
         self._materials: list[Integers] = []
         self._known: dict[tuple[str, str], int] = {}
         self._colours: list[Integers] = []
+        self._coordinates: list[Array] = []
+        self._textures: list[Integers] = []
+        self._known_textures: dict[str, tuple[int, dict[str, str]]] = {}  # label and attributes by part
 
-    def add(self, name: str, rows: Integers, default: tuple[int, int], model: _Groups, *, turned: bool) -> None:
+    def add(self, name: str, rows: Integers, default: tuple[int, int], model: Resources, *, turned: bool) -> None:
         """Add an object.
 
         Parameters
@@ -64,19 +58,35 @@ class Properties:
         if turned:
             rows = rows[:, [0, 3, 2, 1]]
         labels, colours = np.zeros(len(rows), dtype=np.int64), np.full((len(rows), 3, 4), 255, dtype=np.int64)
+        textures, coordinates = np.zeros(len(rows), dtype=np.int64), np.zeros((len(rows), 3, 2))
         for group in np.unique(rows[:, 0]).tolist():
             chosen = np.flatnonzero(rows[:, 0] == group)
-            if group in model.groups:
-                found = [self._known.setdefault(key, len(self._known) + 1) for key in model.groups[group]]
+            if group in model.materials:
+                found = [self._known.setdefault(key, len(self._known) + 1) for key in model.materials[group]]
                 labels[chosen] = _members(np.array([0, *found]), rows[chosen, 1])
             elif group in model.colours:
                 table = np.array([_WHITE, *map(_rgba, model.colours[group])])
                 colours[chosen] = _members(table, rows[chosen, 1:])
+            elif group in model.texture_groups:
+                given = model.texture_groups[group]
+                textures[chosen] = self._texture_label(model.textures.get(given.texture, {}))
+                table = np.concatenate([np.zeros((1, 2)), given.coordinates])
+                coordinates[chosen] = _members(table, rows[chosen, 1:])
         self._materials.append(labels)
         self._colours.append(colours)
+        self._textures.append(textures)
+        self._coordinates.append(coordinates)
 
-    def carry(self, carried: Carried) -> None:
-        """Add the divisions into objects and materials, and the colours of corners."""
+    def _texture_label(self, attributes: dict[str, str]) -> int:
+        """Return the label of a texture: the one of the first texture with the same image."""
+        path = attributes.get("path", "").lstrip("/")
+        return self._known_textures.setdefault(path, (len(self._known_textures) + 1, attributes))[0]
+
+    def carry(self, carried: Carried) -> dict[str, int]:
+        """Add the divisions into objects, materials and textures, and colours and texture coordinates of corners.
+
+        Returns the labels of textures by the parts of the archive with their images.
+        """
         if len(self._names) > 1 or any(self._names):
             usual = np.arange(1, len(self._names) + 1)
             divide(carried, OBJECT, np.repeat(usual, self._counts), self._names, usual.tolist())
@@ -89,13 +99,23 @@ class Properties:
         colours = np.concatenate([np.zeros((0, 3, 4), dtype=np.int64), *self._colours])
         if (colours != 255).any():
             carried.corner_data[COLOUR] = colours.reshape(-1, 4).astype(np.uint8)
+        textures = np.concatenate([np.zeros(0, dtype=np.int64), *self._textures])
+        if not textures.any():
+            return {}
+        carried.corner_data[UV] = np.concatenate(self._coordinates).reshape(-1, 2)
+        texts = [PurePosixPath(path).name for path in self._known_textures]
+        label_of = divide(carried, TEXTURE, textures, texts, range(1, len(texts) + 1))
+        carried.materials[TEXTURES] = {
+            label_of[label]: {key: given[key] for key in TEXTURE_ATTRIBUTES if key in given}
+            for label, given in self._known_textures.values()
+        }
+        return {path: label_of[label] for path, (label, _) in self._known_textures.items()}
 
 
-def _members(table: Integers, members: Integers) -> Integers:
+def _members(table: Array, members: Integers) -> Array:
     """Return the rows of a table, the first of which stands for members that there are not."""
     place = np.where((members >= 0) & (members < len(table) - 1), members + 1, 0)
-    found: Integers = table[place]
-    return found
+    return np.asarray(table[place])
 
 
 def _rgba(text: str) -> tuple[int, ...]:

@@ -17,15 +17,13 @@ import numpy.typing as npt
 
 from anisomesh.io.carried import Carried
 from anisomesh.io.cells import SurfaceCells
-from anisomesh.io.formats.threemf.properties import NONE, Properties, number
+from anisomesh.io.formats.threemf.properties import TEXTURES, Properties
+from anisomesh.io.formats.threemf.resources import CORE, NONE, Resources, number
 from anisomesh.io.polygons import Integers, PolygonSoup
 
 ROOT = "3D/3dmodel.model"
 MODEL_TYPE = "http://schemas.microsoft.com/3dmanufacturing/2013/01/3dmodel"
-CORE = "http://schemas.microsoft.com/3dmanufacturing/core/2015/02"
-MATERIALS = "http://schemas.microsoft.com/3dmanufacturing/material/2015/02"
 _SHAPES = {"beamlattice", "booleanshape", "levelset"}
-_LEFT_OUT = {"texture2d", "compositematerials", "multiproperties"}
 _DEEPEST_COMPONENTS = 100
 _MAX_OBJECTS = 100_000
 _LARGEST_SHARE = 1_100  # uncompressed bytes per byte of an entry; zlib reaches 1,032
@@ -50,8 +48,7 @@ class _Model:
     objects: dict[str, _Object] = field(default_factory=dict)
     items: list[tuple[tuple[str, str], str]] = field(default_factory=list)
     ignored: set[str] = field(default_factory=set)
-    groups: dict[int, list[tuple[str, str]]] = field(default_factory=dict)  # of materials: names, colours
-    colours: dict[int, list[str]] = field(default_factory=dict)  # of colours without names
+    resources: Resources = field(default_factory=Resources)
     unit: str = "millimeter"
 
 
@@ -89,7 +86,7 @@ class _Build:
         name = name.lstrip("/")
         if name not in self._models:
             self._models[name] = _parse_model(_entry(self._archive, name), name)
-            self.ignored |= self._models[name].ignored
+            self.ignored |= self._models[name].ignored | self._models[name].resources.ignored
         self.root = self.root or name
         return self._models[name]
 
@@ -110,7 +107,8 @@ class _Build:
                 raise ValueError(f"a triangle of object {key[1]} refers to a point beyond its {len(points)} points")
             given = np.array(found.properties, dtype=np.int64).reshape(-1, 4)
             is_reflected = bool(np.linalg.det(matrix[:3]) < 0.0)
-            self._properties.add(found.name, given, found.default, self.model(key[0]), turned=is_reflected)
+            resources = self.model(key[0]).resources
+            self._properties.add(found.name, given, found.default, resources, turned=is_reflected)
             if is_reflected:
                 faces = faces[:, ::-1]  # a reflection turns triangles inside out
             self.cells.add("triangle", faces + self._n_points)
@@ -121,7 +119,9 @@ class _Build:
     def carry(self) -> Carried:
         """Return everything besides triangles."""
         carried = Carried()
-        self._properties.carry(carried)
+        for path, label in self._properties.carry(carried).items():
+            with carried.optional(f"the image of the texture {path!r}"):
+                carried.materials[TEXTURES][label]["data"] = _entry(self._archive, path)
         unit = self.model(self.root).unit
         if unit != "millimeter":
             carried.materials["unit"] = unit
@@ -152,20 +152,13 @@ def _entry(archive: zipfile.ZipFile, name: str) -> bytes:
 
 
 def _parse_model(text: bytes, name: str) -> _Model:
-    model, current, group = _Model(), _Object(), NONE
+    model, current = _Model(), _Object()
 
     def start(tag: str, attributes: dict[str, str]) -> None:
-        nonlocal current, group
+        nonlocal current
         namespace, _, local = tag.rpartition(" ")
-        if namespace == MATERIALS:
-            if local == "colorgroup":
-                group = number(attributes.get("id", ""))
-                model.colours[group] = []
-            elif local == "color" and group in model.colours:
-                model.colours[group].append(attributes.get("color", ""))
-            elif local in _LEFT_OUT:
-                model.ignored.add(local)
-        elif namespace != CORE:
+        if namespace != CORE:
+            model.resources.take(namespace, local, attributes)
             if local in _SHAPES:
                 model.ignored.add(local)
         elif local == "vertex":
@@ -179,15 +172,12 @@ def _parse_model(text: bytes, name: str) -> _Model:
             current.default = (number(attributes.get("pid", "")), number(attributes.get("pindex", "")))
         elif local == "model":
             model.unit = attributes.get("unit", model.unit)
-        elif local == "basematerials":
-            group = number(attributes.get("id", ""))
-            model.groups[group] = []
-        elif local == "base" and group in model.groups:
-            model.groups[group].append((attributes.get("name", ""), attributes.get("displaycolor", "")))
         elif local in ("component", "item"):
             path = next((value for key, value in attributes.items() if key.endswith(" path")), "")
             placed = (path, attributes["objectid"]), attributes.get("transform", "")
             (current.components if local == "component" else model.items).append(placed)
+        else:
+            model.resources.take(namespace, local, attributes)
 
     parser = expat.ParserCreate(namespace_separator=" ")
     parser.StartElementHandler = start

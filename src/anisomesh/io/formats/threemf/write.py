@@ -3,27 +3,28 @@
 from __future__ import annotations
 
 import io
-import re
 import zipfile
-from collections.abc import Mapping
-from typing import Any
+from collections.abc import Mapping, Sequence
 from xml.sax.saxutils import quoteattr
 
 import numpy as np
 
 from anisomesh.attributes.model import Mesh, Regions
-from anisomesh.io.carried import COLOUR, Array, Integers
+from anisomesh.io.carried import COLOUR, UV, Array, Integers
 from anisomesh.io.formats.region_names import region_texts
-from anisomesh.io.formats.threemf.properties import MATERIAL, OBJECT
-from anisomesh.io.formats.threemf.read import CORE, MATERIALS, MODEL_TYPE, ROOT
+from anisomesh.io.formats.threemf.properties import MATERIAL, OBJECT, TEXTURE, TEXTURES
+from anisomesh.io.formats.threemf.read import MODEL_TYPE, ROOT
+from anisomesh.io.formats.threemf.resources import CORE, MATERIALS
+from anisomesh.io.formats.threemf.textures import Images, Textured, in_xml, textured
 from anisomesh.io.formats.words import format_rows
 from anisomesh.io.holding import Losses, by_label, main_division
 
 _DATE = (1980, 1, 1, 0, 0, 0)  # of all entries, so that the same mesh gives the same file
 _GREY = "#808080FF"
-_MATERIAL_GROUP, _COLOUR_GROUP, _FIRST_OBJECT = 1, 2, 3  # numbers of resources
+_MATERIAL_GROUP, _COLOUR_GROUP, _FIRST_FREE = 1, 2, 3  # numbers of resources
 _HEAD = '<?xml version="1.0" encoding="UTF-8"?>\n'
-_NOT_IN_XML = re.compile("[^\t\n\r\x20-\ud7ff\ue000-\ufffd\U00010000-\U0010ffff]")
+_RELATIONSHIPS = "http://schemas.openxmlformats.org/package/2006/relationships"
+_TEXTURE_TYPE = "http://schemas.microsoft.com/3dmanufacturing/2013/01/3dtexture"
 _UNITS = ("micron", "millimeter", "centimeter", "inch", "foot", "meter")
 
 
@@ -35,16 +36,20 @@ def threemf_bytes(mesh: Mesh, losses: Losses) -> bytes:
     A division becomes objects, the one called ``material`` base materials; otherwise colours of points or corners are
     kept. Regions keep their names, not their numbers.
     """
-    others = {name: regions for name, regions in mesh.regions.items() if name != MATERIAL}
+    textures = textured(mesh, _FIRST_FREE, losses)
+    held = (MATERIAL,) if textures is None else (MATERIAL, TEXTURE)
+    others = {name: regions for name, regions in mesh.regions.items() if name not in held}
     found = main_division(others, OBJECT)
-    resources, properties = _properties(mesh, losses)
+    resources, properties = _properties(mesh, textures, losses)
     losses.add("regions", *(name for name in others if found is None or name != found[0]))
     losses.add("face data", *mesh.face_data)
     losses.features(mesh)
-    objects = _objects(mesh, None if found is None else found[1], properties, losses)
-    items = "".join(f'<item objectid="{_FIRST_OBJECT + k}"/>' for k in range(len(objects)))
+    first = _FIRST_FREE if textures is None else textures.next_number
+    objects = _objects(mesh, None if found is None else found[1], properties, first, losses)
+    items = "".join(f'<item objectid="{first + k}"/>' for k in range(len(objects)))
     unit = mesh.materials.get("unit", "millimeter")
-    losses.add("materials", *(name for name in mesh.materials if name not in ("unit", "display_colours")))
+    known = ("unit", "display_colours") if textures is None else ("unit", "display_colours", TEXTURES)
+    losses.add("materials", *(name for name in mesh.materials if name not in known))
     if unit not in _UNITS:
         losses.say(f"the unit {unit!r}, for which the file has millimeter")
         unit = "millimeter"
@@ -52,34 +57,50 @@ def threemf_bytes(mesh: Mesh, losses: Losses) -> bytes:
         f'{_HEAD}<model unit="{unit}" xmlns="{CORE}" xmlns:m="{MATERIALS}">\n<resources>{resources}{"".join(objects)}'
         f"</resources><build>{items}</build></model>\n"
     )
-    return _archive(model)
+    return _archive(model, {} if textures is None else textures.images)
 
 
-def _properties(mesh: Mesh, losses: Losses) -> tuple[str, Array]:
-    """Return the groups of materials or colours, and the attributes of each triangle as text (F,)."""
+def _properties(mesh: Mesh, textures: Textured | None, losses: Losses) -> tuple[str, Array]:
+    """Return the groups of textures, materials or colours, and the attributes of each triangle as text (F,)."""
     colours = mesh.corner_data.get(COLOUR)
     if colours is None and COLOUR in mesh.point_data:
         colours = mesh.point_data[COLOUR][mesh.surface.faces]
     materials, n_faces = mesh.regions.get(MATERIAL), mesh.surface.n_faces
     rgba = None if colours is None or materials is not None else _rgba(colours)
-    losses.add("point data", *(name for name in mesh.point_data if name != COLOUR or rgba is None))
-    losses.add("corner data", *(name for name in mesh.corner_data if name != COLOUR or rgba is None))
+    held = [*([] if rgba is None else [COLOUR]), *([] if textures is None else [UV])]
+    losses.add("point data", *(name for name in mesh.point_data if name not in held))
+    losses.add("corner data", *(name for name in mesh.corner_data if name not in held))
     if materials is not None:
-        return _materials(mesh, materials, losses)
-    if rgba is None:
-        return "", np.full(n_faces, "")
+        group, attributes = _materials(mesh, materials, losses)
+    elif rgba is not None:
+        group, attributes = _colours(rgba)
+    else:
+        group, attributes = "", np.full(n_faces, "", dtype=object)
+    if textures is None:
+        return group, attributes
+    is_textured = textures.attributes != ""
+    hidden = np.count_nonzero(is_textured & (attributes != "")) if materials is not None else 0
+    if rgba is not None:
+        hidden = np.count_nonzero(is_textured & (rgba != 255).any(axis=(1, 2)))
+    if hidden:
+        losses.say(f"the {'colours' if materials is None else 'materials'} of {hidden} face(s) that have a texture")
+    return textures.resources + group, np.where(is_textured, textures.attributes, attributes)
+
+
+def _colours(rgba: Array) -> tuple[str, Array]:
+    """Return the group of colours, given at corners (F, 3, 4), and the attributes of triangles."""
     table, numbers = np.unique(rgba.reshape(-1, 4), axis=0, return_inverse=True)
     entries = "".join(f'<m:color color="#{bytes(row.tolist()).hex().upper()}"/>' for row in table)
     members = numbers.reshape(-1, 3).tolist()
     attributes = [f' pid="{_COLOUR_GROUP}" p1="{a}" p2="{b}" p3="{c}"' for a, b, c in members]
-    return f'<m:colorgroup id="{_COLOUR_GROUP}">{entries}</m:colorgroup>', np.array(attributes)
+    return f'<m:colorgroup id="{_COLOUR_GROUP}">{entries}</m:colorgroup>', np.array(attributes, dtype=object)
 
 
 def _materials(mesh: Mesh, materials: Regions, losses: Losses) -> tuple[str, Array]:
     """Return the group of base materials and the attributes of triangles; label 0 without a name stands for none."""
     given = mesh.materials.get("display_colours")
     displayed = given if isinstance(given, Mapping) else {}
-    texts = region_texts(materials, losses, _in_xml, distinct=True)
+    texts = region_texts(materials, losses, in_xml, distinct=True)
     labels = [label for label in texts if label != 0 or label in materials.names or len(texts) == 1]
     entries = []
     for label in labels:
@@ -105,17 +126,15 @@ def _rgba(colours: Array) -> Array | None:
     return np.rint(255.0 * shares).astype(np.uint8)
 
 
-def _objects(mesh: Mesh, division: Regions | None, properties: Array, losses: Losses) -> list[str]:
-    """Return the objects, each with its points."""
+def _objects(mesh: Mesh, division: Regions | None, properties: Array, first: int, losses: Losses) -> list[str]:
+    """Return the objects, each with its points, numbered from the first one on."""
     points, faces = mesh.surface.points, mesh.surface.faces.astype(np.int64)
     if division is None:
-        return [_object(_FIRST_OBJECT, "", points, faces, properties)]
-    objects, texts = [], region_texts(division, losses, _in_xml)
+        return [_object(first, "", points, faces, properties)]
+    objects, texts = [], region_texts(division, losses, in_xml)
     for k, ((label,), chosen) in enumerate(by_label(division.labels)):
         used, corners = np.unique(faces[chosen], return_inverse=True)
-        objects.append(
-            _object(_FIRST_OBJECT + k, texts[label], points[used], corners.reshape(-1, 3), properties[chosen])
-        )
+        objects.append(_object(first + k, texts[label], points[used], corners.reshape(-1, 3), properties[chosen]))
     return objects
 
 
@@ -128,25 +147,33 @@ def _object(number: int, name: str, points: Array, faces: Integers, properties: 
     return f'<object id="{number}" type="model"{named}>{mesh}</object>'
 
 
-def _in_xml(text: str) -> str:
-    """Return a text without the characters that XML does not allow."""
-    return _NOT_IN_XML.sub(" ", text)
-
-
-def _archive(model: str) -> bytes:
-    """Return the archive of a model."""
+def _archive(model: str, images: Images) -> bytes:
+    """Return the archive of a model with images of textures."""
     types = "http://schemas.openxmlformats.org/package/2006/content-types"
-    relationships = "http://schemas.openxmlformats.org/package/2006/relationships"
-    entries: dict[str, Any] = {
+    kinds = "".join(
+        f'<Override PartName="/{part}" ContentType={quoteattr(kind)}/>' for part, (kind, _) in images.items()
+    )
+    entries = {
         "[Content_Types].xml": f'{_HEAD}<Types xmlns="{types}">'
         '<Default Extension="rels" ContentType="application/vnd.openxmlformats-package.relationships+xml"/>'
-        '<Default Extension="model" ContentType="application/vnd.ms-package.3dmanufacturing-3dmodel+xml"/></Types>\n',
-        "_rels/.rels": f'{_HEAD}<Relationships xmlns="{relationships}">'
-        f'<Relationship Target="/{ROOT}" Id="rel0" Type="{MODEL_TYPE}"/></Relationships>\n',
+        '<Default Extension="model" ContentType="application/vnd.ms-package.3dmanufacturing-3dmodel+xml"/>'
+        f"{kinds}</Types>\n",
+        "_rels/.rels": _relationships(MODEL_TYPE, [ROOT]),
         ROOT: model,
     }
+    if images:
+        folder, _, name = ROOT.rpartition("/")
+        entries[f"{folder}/_rels/{name}.rels"] = _relationships(_TEXTURE_TYPE, list(images))
+    content = {name: text.encode("utf-8", errors="replace") for name, text in entries.items()}
+    content |= {part: data for part, (_, data) in images.items()}
     buffer = io.BytesIO()
     with zipfile.ZipFile(buffer, "w", zipfile.ZIP_DEFLATED) as archive:
-        for name, text in entries.items():
-            archive.writestr(zipfile.ZipInfo(name, _DATE), text.encode("utf-8", errors="replace"), zipfile.ZIP_DEFLATED)
+        for name, data in content.items():
+            archive.writestr(zipfile.ZipInfo(name, _DATE), data, zipfile.ZIP_DEFLATED)
     return buffer.getvalue()
+
+
+def _relationships(kind: str, targets: Sequence[str]) -> str:
+    """Return the text that names other parts of the archive that a part needs."""
+    rows = "".join(f'<Relationship Target="/{part}" Id="rel{k}" Type="{kind}"/>' for k, part in enumerate(targets))
+    return f'{_HEAD}<Relationships xmlns="{_RELATIONSHIPS}">{rows}</Relationships>\n'

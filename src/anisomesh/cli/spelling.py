@@ -1,0 +1,35 @@
+"""Options in messages of the library, whose names are the ones of Python, as the command line spells them."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Iterable
+from dataclasses import fields
+
+from anisomesh.options import RemeshOptions
+
+OTHER_SPELLINGS = {"n_vertices": "--vertices", "weld_tolerance": "--weld", "size_field": "size of --metric-file"}
+"""Options that are not called on the command line as in Python."""
+
+_PYTHON_ONLY = ("energy",)
+_SPELLINGS = {
+    name: OTHER_SPELLINGS.get(name, f"--{name.replace('_', '-')}")
+    for name in (*(field.name for field in fields(RemeshOptions)), "n_vertices", "ratio", "max_error")
+    if name not in _PYTHON_ONLY
+}
+_SEVERAL_WORDS = "|".join(name for name in _SPELLINGS if "_" in name)
+_ONE_WORD = "|".join(name for name in _SPELLINGS if "_" not in name)
+_NAME = re.compile(
+    rf"(?<![\w./\\'\"-])({_SEVERAL_WORDS})(?!\w|[./\\'\"-]\w)"  # not in file names and quotations
+    rf"|(?:(?<=^)|(?<=: ))({_ONE_WORD})(?=\[| = | has \d| ['\d])"  # in front of a value: they are words of English
+)
+
+
+def as_options(message: str) -> str:
+    """Return a message with options of a remesh as the command line spells them, such as ``--max-error``."""
+    return _NAME.sub(lambda match: _SPELLINGS[match[1] or match[2]], message)
+
+
+def warning_rows(warnings: Iterable[str]) -> list[tuple[str, str]]:
+    """Return the rows of a table with the warnings of a remesh."""
+    return [("warning", as_options(text)) for text in warnings]

@@ -1,0 +1,278 @@
+"""The sections of MEDIT files, text and binary.
+
+Format: Frey, "MEDIT: an interactive mesh visualization software", INRIA RT-0253; the names, the keywords and the
+layout of binary files are the ones of libMeshb 7, https://github.com/LoicMarechal/libMeshb.
+"""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Iterator
+from typing import Any, Literal, NamedTuple, Protocol
+
+import numpy as np
+import numpy.typing as npt
+
+from anisomesh.io.carried import Integers
+from anisomesh.io.formats.words import whole
+
+KEYWORDS = {
+    "Dimension": 3,
+    "Vertices": 4,
+    "Edges": 5,
+    "Triangles": 6,
+    "Quadrilaterals": 7,
+    "Tetrahedra": 8,
+    "Prisms": 9,
+    "Hexahedra": 10,
+    "Corners": 13,
+    "Ridges": 14,
+    "RequiredVertices": 15,
+    "RequiredEdges": 16,
+    "RequiredTriangles": 17,
+    "RequiredQuadrilaterals": 18,
+    "TangentAtEdgeVertices": 19,
+    "NormalAtVertices": 20,
+    "NormalAtTriangleVertices": 21,
+    "NormalAtQuadrilateralVertices": 22,
+    "AngleOfCornerBound": 23,
+    "TrianglesP2": 24,
+    "EdgesP2": 25,
+    "QuadrilateralsQ2": 27,
+    "TetrahedraP2": 30,
+    "HexahedraQ2": 33,
+    "Pyramids": 49,
+    "BoundingBox": 50,
+    "End": 54,
+    "Tangents": 59,
+    "Normals": 60,
+    "TangentAtVertices": 61,
+    "SolAtVertices": 62,
+    "Comments": 81,
+    "PrismsP2": 86,
+    "PyramidsP2": 87,
+    "QuadrilateralsQ3": 88,
+    "QuadrilateralsQ4": 89,
+    "TrianglesP3": 90,
+    "TrianglesP4": 91,
+    "EdgesP3": 92,
+    "EdgesP4": 93,
+    "TetrahedraP3": 96,
+    "TetrahedraP4": 97,
+    "HexahedraQ3": 98,
+    "HexahedraQ4": 99,
+    "PyramidsP3": 100,
+    "PyramidsP4": 101,
+    "PrismsP3": 102,
+    "PrismsP4": 103,
+    "TrianglesP2Ordering": 129,
+    "TrianglesP3Ordering": 130,
+    "QuadrilateralsQ2Ordering": 131,
+    "QuadrilateralsQ3Ordering": 132,
+    "TrianglesP4Ordering": 144,
+    "QuadrilateralsQ4Ordering": 146,
+    "FloatingPointPrecision": 155,
+}
+"""Numbers of sections in binary files by their names in text."""
+
+PLANE, SPACE = 2, 3
+"""Dimensions of files: numbers of coordinates of points."""
+
+END = "End"
+
+_NAMES_BY_NUMBER = {code: name for name, code in KEYWORDS.items()}
+_LONG_POSITIONS, _LONG_INTEGERS = 3, 4  # first versions whose positions, and whose integers, have 64 bits
+
+
+class Section(Protocol):
+    """A section of a file, whose numbers are read from the first one on."""
+
+    name: str
+
+    @property
+    def n_left(self) -> int:
+        """How much is left: words of text, or bytes."""
+
+    def count(self) -> int:
+        """Return the next number, which counts rows."""
+
+    def types(self, count: int) -> list[int]:
+        """Return the next integers, which have 32 bits in any version."""
+
+    def rows(self, count: int, reals: int, integers: int) -> npt.NDArray[np.float64]:
+        """Return rows of real numbers and integers (count, reals + integers)."""
+
+
+class Sections(NamedTuple):
+    """A file: the number of coordinates of points, its sections in order, and whether it has an end."""
+
+    dimension: int
+    sections: list[Section]
+    ends: bool
+
+    def named(self, name: str) -> Section | None:
+        """Return the last section of a name."""
+        return next((section for section in reversed(self.sections) if section.name == name), None)
+
+
+def table(section: Section, reals: int, integers: int) -> npt.NDArray[np.float64]:
+    """Return the rows (n, reals + integers) of a section that begins with their number."""
+    return section.rows(section.count(), reals, integers)
+
+
+def marks(section: Section) -> Integers:
+    """Return the numbers (n,), from 0, that a section lists."""
+    numbers: Integers = whole(table(section, 0, 1))[:, 0] - 1
+    return numbers
+
+
+def read_sections(data: bytes) -> Sections:
+    """Return the sections of a file, text or binary.
+
+    Raises
+    ------
+    ValueError
+        If it is neither, of a version or dimension that is not known, or cut off between sections.
+    """
+    cookie = {b"\x01\x00\x00\x00": "<", b"\x00\x00\x00\x01": ">"}.get(data[:4])
+    found = list(_text_sections(data) if cookie is None else _binary_sections(data, "<" if cookie == "<" else ">"))
+    ends = bool(found) and found[-1].name == END
+    dimension = SPACE
+    for section in found:
+        if section.name == "Dimension" and section.n_left:
+            dimension = section.types(1)[0]
+            if dimension not in (PLANE, SPACE):
+                raise ValueError(f"its dimension is {dimension}; expected {PLANE} or {SPACE}")
+    return Sections(dimension, [section for section in found if section.name not in ("Dimension", END)], ends)
+
+
+class _Text:
+    """A section of text."""
+
+    def __init__(self, name: str, words: list[bytes]) -> None:
+        self.name = name
+        self._words, self._at = words, 0
+
+    @property
+    def n_left(self) -> int:
+        return len(self._words) - self._at
+
+    def count(self) -> int:
+        if not self.n_left or not self._words[self._at].isdigit():
+            raise ValueError(f"truncated: the section {self.name} has no count")
+        self._at += 1
+        return int(self._words[self._at - 1])
+
+    def types(self, count: int) -> list[int]:
+        found: list[int] = whole(self._take(count)).tolist()
+        return found
+
+    def rows(self, count: int, reals: int, integers: int) -> npt.NDArray[np.float64]:
+        width = reals + integers
+        if self.n_left < count * width:
+            raise ValueError(
+                f"truncated: {self.name} declares {count} rows of {width} but {self.n_left} numbers follow"
+            )
+        return self._take(count * width).reshape(count, width)
+
+    def _take(self, count: int) -> npt.NDArray[np.float64]:
+        if not 0 <= count <= self.n_left:
+            raise ValueError(
+                f"truncated: the section {self.name} has {self.n_left} numbers where {count} should follow"
+            )
+        self._at += count
+        try:
+            return np.array(list(map(float, self._words[self._at - count : self._at])), dtype=np.float64)
+        except ValueError as error:
+            raise ValueError(f"malformed: the section {self.name} should give numbers: {error}") from None
+
+
+def _text_sections(data: bytes) -> Iterator[Section]:
+    words = re.sub(rb"#[^\n]*", b"", data).split()
+    if not words or not words[0].startswith(b"MeshVersionFormatted"):
+        raise ValueError("it does not begin with MeshVersionFormatted as a MEDIT text file does")
+    starts = [k for k, word in enumerate(words) if word[:1].isalpha() and word.lower() not in (b"nan", b"inf")]
+    for k, end in zip(starts, [*starts[1:], len(words)], strict=True):
+        yield _Text(words[k].decode(errors="replace"), words[k + 1 : end])
+
+
+class _Layout(NamedTuple):
+    """Byte order of a binary file, its version, and the bytes of its real numbers."""
+
+    order: Literal["<", ">"]
+    version: int
+    real_bytes: int
+
+    @property
+    def integer(self) -> str:
+        return f"{self.order}i{8 if self.version >= _LONG_INTEGERS else 4}"
+
+
+class _Binary:
+    """A section of a binary file."""
+
+    def __init__(self, name: str, data: memoryview, layout: _Layout) -> None:
+        self.name = name
+        self._data, self._layout = data, layout
+
+    @property
+    def n_left(self) -> int:
+        return len(self._data)
+
+    def count(self) -> int:
+        count = int(self._take(self._layout.integer, 1)[0])
+        if count < 0:
+            raise ValueError(f"malformed: the section {self.name} declares {count} rows")
+        return count
+
+    def types(self, count: int) -> list[int]:
+        found: list[int] = self._take(f"{self._layout.order}i4", count).tolist()
+        return found
+
+    def rows(self, count: int, reals: int, integers: int) -> npt.NDArray[np.float64]:
+        real = f"{self._layout.order}f{self._layout.real_bytes}"
+        rows = self._take(np.dtype([("reals", real, (reals,)), ("integers", self._layout.integer, (integers,))]), count)
+        return np.concatenate([rows["reals"], rows["integers"]], axis=1, dtype=np.float64)
+
+    def _take(self, kind: npt.DTypeLike, count: int) -> npt.NDArray[Any]:
+        dtype = np.dtype(kind)
+        size = count * dtype.itemsize
+        if not 0 <= size <= len(self._data):
+            raise ValueError(
+                f"truncated: the section {self.name} has {len(self._data)} bytes where {size} should follow"
+            )
+        taken, self._data = self._data[:size], self._data[size:]
+        return np.frombuffer(taken, dtype=dtype)
+
+
+def _binary_sections(data: bytes, order: Literal["<", ">"]) -> Iterator[Section]:
+    """Yield the sections, each of which says where the next one begins."""
+    whole_file = memoryview(data)
+
+    def integers(at: int, kind: str, count: int = 1) -> list[int]:
+        size = count * np.dtype(kind).itemsize
+        if at + size > len(data):
+            raise ValueError(f"truncated: a section should begin at byte {at} of {len(data)}")
+        found: list[int] = np.frombuffer(whole_file[at : at + size], dtype=order + kind).tolist()
+        return found
+
+    version = integers(4, "i4")[0]
+    if not 1 <= version <= _LONG_INTEGERS:
+        raise ValueError(f"its version is {version}; expected 1 to {_LONG_INTEGERS}")
+    layout = _Layout(order, version, 4 if version == 1 else 8)
+    position = "i8" if version >= _LONG_POSITIONS else "i4"
+    at = 8
+    while 0 < at < len(data):
+        code = integers(at, "i4")[0]
+        name = _NAMES_BY_NUMBER.get(code, f"of number {code}")
+        begin = at + 4 + np.dtype(position).itemsize
+        after = 0 if name == END else integers(at + 4, position)[0]
+        end = after or max(begin, len(data))
+        if not begin <= end <= max(begin, len(data)):
+            raise ValueError(f"truncated or malformed: the section {name} ends at byte {end} of {len(data)}")
+        section = _Binary(name, whole_file[begin:end], layout)
+        if name == "FloatingPointPrecision":
+            layout = layout._replace(real_bytes={32: 4, 64: 8}.get(section.count(), layout.real_bytes))
+        else:
+            yield section
+        at = after
