@@ -40,14 +40,15 @@ def with_short_cuts(points: Points, faces: Faces, pairs: Pairs, areas: FaceScala
     of the surface with the parity of these crossings. Components that one path does not make orientable, such as
     closed ones, keep their cuts.
     """
-    cut, n_fans, fans = found.conflict, *topology.corner_fans(faces, pairs)
+    n_fans, fans = topology.corner_fans(faces, pairs)
+    cut = found.conflict
     component = topology.graph_components(pairs // 3, len(faces))[1][pairs[:, 0] // 3]
-    ends = np.stack([fans[corners[:, 0]] for corners in topology.side_ends(pairs)], axis=1)
+    ends = np.stack([fans[corners[:, 0]] for corners in topology.side_ends(pairs)], axis=1).astype(np.int64)
     place = np.empty((n_fans, 3))
     place[fans] = points[faces.ravel()]
     lengths = np.linalg.norm(place[ends[:, 1]] - place[ends[:, 0]], axis=1)
     open_sides = np.setdiff1d(np.arange(3 * len(faces)), pairs)
-    at_boundary = np.unique(fans[np.concatenate(topology.side_ends(open_sides))])
+    at_boundary = np.unique(fans[np.concatenate(topology.side_ends(open_sides))]).astype(np.int64)
     for number in np.unique(component[cut]).tolist():
         own = component == number
         crossed = _reversing_loop(pairs, own, cut, len(faces))
