@@ -10,6 +10,7 @@ from anisomesh._arrays import EdgeEnds, PointMask
 from anisomesh._kernels import decimate as kernels
 from anisomesh._kernels.heap import EdgeHeap
 from anisomesh._kernels.stars import Stars
+from anisomesh.execution.deadline import NO_DEADLINE, Deadline
 from anisomesh.mesh.closest_points import ClosestPoints
 from anisomesh.mesh.marked_surface import MarkedSurface
 from anisomesh.mesh.surface import Surface
@@ -47,6 +48,7 @@ def decimate(
     crease_edges: EdgeEnds | None = None,
     moves: bool = True,
     reference: ClosestPoints | None = None,
+    deadline: Deadline = NO_DEADLINE,
 ) -> Decimated:
     """Collapse edges, the cheapest first, until a number of points is left or none can go.
 
@@ -66,6 +68,8 @@ def decimate(
         distances are small: the mesh has good triangles that are to stay so.
     reference
         A surface against which few triangles are to be inverted.
+    deadline
+        Asked before all is done again.
 
     Notes
     -----
@@ -89,7 +93,7 @@ def decimate(
     least = np.count_nonzero(inverted_faces(surface, reference))
     inverted = fewest = inverted_faces(result.surface, reference)
     for repeat in range(_MAX_REPEATS):
-        if np.count_nonzero(fewest) <= least or result.surface.n_points > best.surface.n_points:
+        if np.count_nonzero(fewest) <= least or result.surface.n_points > best.surface.n_points or deadline.passed():
             break
         stays |= points_near_faces(surface, result.surface, inverted, rings=repeat)
         result = _collapsed(surface, n_points, stays, creases, moves=moves)
