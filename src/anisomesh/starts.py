@@ -17,7 +17,7 @@ from anisomesh.features.tagged import distance_to_crease_edges
 from anisomesh.fitting.target import FitTarget
 from anisomesh.fitting.valid import fit_without_faults
 from anisomesh.io.describe import soundness
-from anisomesh.junctions.join import Conforming, JoinTask
+from anisomesh.junctions.join import MAX_FAULTS, Conforming, JoinTask
 from anisomesh.mesh.surface import Surface
 from anisomesh.mesh.validity import Validity, check_validity
 from anisomesh.options import RemeshOptions
@@ -26,7 +26,6 @@ from anisomesh.voronoi.restricted import RestrictedVoronoi
 
 logger = logging.getLogger(__name__)
 
-_MAX_FAULTS_OF_JOINED = 3  # up to which another start is tried for joined sheets, that may be better apart; heuristic
 MAX_STARTS = 3  # of the optimisation, with one seed after the other, for a mesh without faults
 
 
@@ -60,7 +59,7 @@ def valid_mesh(task: MeshTask, options: RemeshOptions, run: Run) -> MadeMesh | N
     for seed in range(options.seed + 1, options.seed + MAX_STARTS):
         if best is None or made is None or not best.validity.faults or run.deadline.passed():
             break
-        if task.join is not None and best.validity.faults > _MAX_FAULTS_OF_JOINED:
+        if task.join is not None and best.validity.faults > MAX_FAULTS:
             break
         if made.validity.self_intersections_input > 0 or made.mesh.from_input:
             break

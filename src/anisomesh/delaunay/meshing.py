@@ -21,7 +21,7 @@ from anisomesh.mesh.surface import Surface
 from anisomesh.mesh.validity import faulty_faces
 from anisomesh.meshops.anchoring.anchored import anchored
 from anisomesh.meshops.anchors import Anchors
-from anisomesh.meshops.decimation import decimate, ends_of_creases
+from anisomesh.meshops.decimation import decimate_facing, ends_of_creases
 from anisomesh.meshops.edge_recovery import recover_edges
 from anisomesh.meshops.flip import flip_for_shape
 from anisomesh.meshops.held import Held, at_places
@@ -98,8 +98,7 @@ class MeshingTask:
 
     def decimated(self, mesh: Surface, n: int, held: PointMask, creases: EdgeEnds) -> tuple[Surface, EdgeEnds]:
         """Return a mesh and its crease edges decimated to n points, which do not move, if possible."""
-        near, until = self.reference, self.deadline
-        fewer = decimate(mesh, n, held=held, crease_edges=creases, moves=False, reference=near, deadline=until)
+        fewer = decimate_facing(mesh, n, self.reference, held=held, crease_edges=creases, deadline=self.deadline)
         return fewer.surface, fewer.crease_edges
 
 
@@ -265,8 +264,7 @@ def _without_inverted(task: MeshingTask, mesh: FeatureMesh) -> FeatureMesh:
 
 def _coarsened(task: MeshingTask, mesh: FeatureMesh) -> FeatureMesh:
     """Return the mesh with no more vertices than asked for, if collapses can do that: step 4."""
-    n = task.n_vertices
-    if len(mesh.points) <= n:
+    if len(mesh.points) <= (n := task.n_vertices):
         return mesh
     surface, creases = Surface(mesh.points, mesh.faces), mesh.crease_edges
     anchored = task.anchors.held_in(mesh.points)

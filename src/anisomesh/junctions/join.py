@@ -19,6 +19,7 @@ from anisomesh.junctions.seam import Seam, seam_along
 from anisomesh.mesh.geometry import Frame, even_edge_length
 from anisomesh.mesh.surface import Surface
 from anisomesh.mesh.topology import edge_keys
+from anisomesh.mesh.validity import faulty_faces
 from anisomesh.meshops.change import apply_changes
 from anisomesh.meshops.flip import flip_for_shape
 from anisomesh.meshops.held import Held
@@ -30,6 +31,7 @@ _MAX_CROWDING = 2.0  # vertices of a chain in the length of a mean edge; heurist
 _MAX_EXCESS = 1.5  # of the vertices asked for, where junctions take more than sheets apart would; heuristic
 _MAX_INVERTED = 10  # triangles of sheets made to conform, of which some stay inverted where there are more; heuristic
 _LEAST_LENGTH = 0.08  # of a curve, in distances of evenly spread vertices; heuristic, chosen on training meshes
+MAX_FAULTS = 3  # of joined sheets, up to which a fit or another start may remove them; heuristic
 _MAX_SETTLING_ROUNDS = 20  # of changes until no edges coincide and the number of vertices is right
 
 Ints = npt.NDArray[np.int64]
@@ -97,18 +99,12 @@ class JoinTask:
     def conforming(self, mesh: ValidMesh) -> Conforming | None:
         """Return a mesh of sheets with the same vertices along junctions, as many as wanted in all when joined.
 
-        None if that cannot be done, or only with many inverted triangles.
+        None if that cannot be done, or only with many faulty triangles.
         """
-        task, sheets = self.task, self.junctions.sheets
-        reference = sheets.with_points(self.frame.to_unit(sheets.points))
-        exact = np.array_equal(reference.points, task.surface.points)
-        found = bundled(Surface(mesh.points, mesh.faces), self.junctions, reference, exact=exact)
-        thinner = None if found is None else _thinned(mesh, found, task)
-        if thinner is not None:
-            mesh = thinner
-            found = bundled(Surface(mesh.points, mesh.faces), self.junctions, reference, exact=exact)
-        if found is None:
+        task, bundles = self.task, self._bundled(mesh)
+        if bundles is None:
             return None
+        mesh, found = bundles
         most = max(int(_MAX_EXCESS * self.n_vertices), len(mesh.points))
         found = without_narrow_faces(found, task.reference)
         made = conform(found.points, found.faces, found.bundles)
@@ -121,9 +117,23 @@ class JoinTask:
         faces, creases = with_ends_at_nodes(made.points, made.faces, mesh.crease_edges, nodes, lines, task.reference)
         tidy = _tidied(replace(mesh, points=made.points, faces=faces, crease_edges=creases), task)
         settled = _settled(Conforming(tidy, seam, most), task, self.n_vertices)
-        if settled is None or seam.join(Surface(settled.points, settled.faces)) is None:
+        if settled is None:
             return None
-        return Conforming(settled, seam, most)
+        sheets = Surface(settled.points, settled.faces)
+        fits = seam.join(sheets) is not None and len(faulty_faces(sheets, task.reference)) <= MAX_FAULTS
+        return Conforming(settled, seam, most) if fits else None
+
+    def _bundled(self, mesh: ValidMesh) -> tuple[ValidMesh, Bundled] | None:
+        """Return a mesh without crowded chains, and these; None if its boundary is not the one of the sheets."""
+        sheets = self.junctions.sheets
+        reference = sheets.with_points(self.frame.to_unit(sheets.points))
+        exact = np.array_equal(reference.points, self.task.surface.points)
+        found = bundled(Surface(mesh.points, mesh.faces), self.junctions, reference, exact=exact)
+        thinner = None if found is None else _thinned(mesh, found, self.task)
+        if thinner is not None:
+            mesh = thinner
+            found = bundled(Surface(mesh.points, mesh.faces), self.junctions, reference, exact=exact)
+        return None if found is None else (mesh, found)
 
     def joined(self, conforming: Conforming, fitted: Surface) -> Surface:
         """Return the joined sheets of a mesh as they are fitted, or as they were where that would join more."""
