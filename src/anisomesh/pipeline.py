@@ -30,7 +30,7 @@ from anisomesh.execution.deadline import Deadline
 from anisomesh.execution.progress import OnStep, StepInfo, ignore_steps
 from anisomesh.execution.run import OPTIMISATION_SHARE, Run
 from anisomesh.io.meshes import mesh_of
-from anisomesh.junctions.join import JoinTask, sites_for
+from anisomesh.junctions.join import JoinTask, are_resolved, sites_for
 from anisomesh.mesh.surface import Surface
 from anisomesh.metric.conformity import Conformity, MetricExtent, conformity
 from anisomesh.metric.unit_edges import UnitMetric
@@ -159,10 +159,12 @@ def _with_attributes(result: RemeshResult, given: Mesh, cut: Cut, options: Remes
 
 def _joined_or_apart(given: Mesh, cut: Cut, n: int, options: RemeshOptions, run: Run, **how: Any) -> RemeshResult:
     """Remesh a prepared surface with n vertices, its sheets joined at junctions; apart if that has fewer faults."""
-    joined = _remesh(cut, n, options, run, **how)
+    junctions, joined = cut.rest.junctions, None
+    if junctions is None or cut.locked.any() or are_resolved(junctions, cut.count_of_rest(n)):
+        joined = _remesh(cut, n, options, run, **how)
     if joined is not None:
         late = run.deadline.share(OPTIMISATION_SHARE).passed()
-        if cut.rest.junctions is None or not joined.validity.faults or late:
+        if junctions is None or not joined.validity.faults or late:
             return joined
     logger.info("the sheets cannot be joined well with %d vertices, and are remeshed apart", n)
     apart = _remesh(_cut(given, options, run, joined=False), n, options, run, **how)

@@ -6,17 +6,18 @@ import logging
 from dataclasses import dataclass, replace
 from functools import partial
 
+from anisomesh._arrays import Sites
 from anisomesh.cvt.lbfgs import Optimised
 from anisomesh.cvt.schedule import DualFeedback, optimise_sites
 from anisomesh.delaunay.creases import missing_on_creases
 from anisomesh.delaunay.dual import dual_squared_errors
-from anisomesh.delaunay.meshing import MeshingTask, ValidMesh, mesh_from_sites
+from anisomesh.delaunay.meshing import MeshingTask, ValidMesh, mesh_from_sites, mesh_of_dual
 from anisomesh.execution.run import OPTIMISATION_SHARE, Run
 from anisomesh.features.tagged import distance_to_crease_edges
 from anisomesh.fitting.target import FitTarget
 from anisomesh.fitting.valid import fit_without_faults
 from anisomesh.io.describe import soundness
-from anisomesh.junctions.join import JoinTask
+from anisomesh.junctions.join import MAX_FAULTS, Conforming, JoinTask
 from anisomesh.mesh.surface import Surface
 from anisomesh.mesh.validity import Validity, check_validity
 from anisomesh.options import RemeshOptions
@@ -25,7 +26,6 @@ from anisomesh.voronoi.restricted import RestrictedVoronoi
 
 logger = logging.getLogger(__name__)
 
-_MAX_FAULTS_OF_JOINED = 10  # up to which another start is tried for joined sheets, that may be better apart; heuristic
 MAX_STARTS = 3  # of the optimisation, with one seed after the other, for a mesh without faults
 
 
@@ -59,7 +59,7 @@ def valid_mesh(task: MeshTask, options: RemeshOptions, run: Run) -> MadeMesh | N
     for seed in range(options.seed + 1, options.seed + MAX_STARTS):
         if best is None or made is None or not best.validity.faults or run.deadline.passed():
             break
-        if task.join is not None and best.validity.faults > _MAX_FAULTS_OF_JOINED:
+        if task.join is not None and best.validity.faults > MAX_FAULTS:
             break
         if made.validity.self_intersections_input > 0 or made.mesh.from_input:
             break
@@ -84,14 +84,10 @@ def _mesh_of_start(start: MeshTask, options: RemeshOptions, run: Run) -> MadeMes
             deadline=run.deadline.share(OPTIMISATION_SHARE),
         )
     with run.stage("dual"):
-        mesh = mesh_from_sites(task, optimised.sites)
-        conforming = None if join is None else join.conforming(mesh)
-        if conforming is not None:
-            mesh = conforming.mesh
-        elif join is not None:
-            if not run.deadline.share(OPTIMISATION_SHARE).passed():
-                return None  # there is time to remesh what is better apart
-            mesh = join.apart(mesh)
+        meshed = _meshed(task, join, optimised.sites, run)
+        if meshed is None:
+            return None
+        mesh, conforming = meshed
     with run.stage("fit"):
         surface = Surface(mesh.points, mesh.faces)
         feature_distance = distance_to_crease_edges(
@@ -114,3 +110,22 @@ def _mesh_of_start(start: MeshTask, options: RemeshOptions, run: Run) -> MadeMes
         seed=options.seed,
         joined=conforming is not None,
     )
+
+
+def _meshed(
+    task: MeshingTask, join: JoinTask | None, sites: Sites, run: Run
+) -> tuple[ValidMesh, Conforming | None] | None:
+    """Return the mesh of sites, and with its seam if its sheets are to be joined and conform.
+
+    None if they are not joined well, and there is time to remesh what is better apart. That is found out before costly
+    repairs: a surface coarsened for want of sites crowds vertices at junctions, and has inverted triangles there.
+    """
+    if join is None:
+        return mesh_from_sites(task, sites), None
+    mesh = mesh_of_dual(task, sites)
+    conforming = None if mesh is None else join.conforming(mesh)
+    if conforming is not None:
+        return conforming.mesh, conforming
+    if not run.deadline.share(OPTIMISATION_SHARE).passed():
+        return None
+    return join.apart(mesh_from_sites(task, sites) if mesh is None else mesh), None

@@ -2,12 +2,15 @@
 
 import numpy as np
 import pytest
-from junction_shapes import SHAPES, lengths_by_count
+from junction_shapes import SHAPES, lengths_by_count, square
 from scipy.spatial import cKDTree
 
 import anisomesh
+from anisomesh import starts
 from anisomesh.attributes.model import Mesh, Regions
+from anisomesh.delaunay.meshing import mesh_from_sites
 from anisomesh.junctions import join
+from anisomesh.junctions.cut import cut_at_junctions
 from anisomesh.mesh.distance import surface_distance
 from anisomesh.mesh.surface import Surface
 from anisomesh.mesh.topology import connected_components, euler_characteristic
@@ -167,3 +170,64 @@ def test_a_prescribed_line_across_a_junction_is_followed(how):
     assert result.feature_distance < 1e-12
     ends = result.mesh.surface.points[result.mesh.features]
     assert np.linalg.norm(ends[:, 1] - ends[:, 0], axis=1).sum() == pytest.approx(2.0, rel=1e-12)
+
+
+def test_settling_ends_with_the_time_limit(monkeypatch):
+    """The clock stands still until the first change of the number of vertices, and is past the limit from then on."""
+    changes = []
+    with_count = join._with_count
+
+    def last_in_time(mesh, task, *more):
+        changes.append(len(mesh.points))
+        task.deadline.start -= 2.0 * task.deadline.limit
+        return with_count(mesh, task, *more)
+
+    monkeypatch.setattr(join, "_with_count", last_in_time)
+    surface = Surface(*SHAPES["book"]())
+    result = anisomesh.remesh(surface, n_vertices=120, embedding="direct", threads=1, time_limit=1e4)
+    assert len(changes) == 1
+    assert lengths_by_count(result.surface.points, result.surface.faces).keys() == {1, 5}
+
+
+@pytest.mark.parametrize("name", ["grid_of_boxes", "cubes_at_an_edge", "disc_in_tube"])
+def test_sheets_are_joined_with_more_vertices_than_asked_for_where_junctions_need_them(name):
+    """Edges of several sheets would become one, again and again, if points beside the junctions were removed."""
+    surface = Surface(*SHAPES[name]())
+    result = anisomesh.remesh(surface, n_vertices=6, embedding="direct", threads=1, max_iterations=15)
+    made = result.surface
+    before, after = (lengths_by_count(each.points, each.faces) for each in (surface, made))
+    assert before.keys() == after.keys()
+    assert euler_characteristic(made.faces) == euler_characteristic(surface.faces)
+    assert result.validity.faults == 0
+    assert f"{made.n_points} vertices instead of 6" in " ".join(result.warnings)
+
+
+def test_sheets_whose_dual_lacks_their_topology_are_given_up_before_it_is_coarsened(monkeypatch):
+    """What the sheets have no cells for crowds vertices at junctions; the costly way is left to the sheets apart."""
+    coarsened = []
+    monkeypatch.setattr(starts, "mesh_of_dual", lambda task, sites: None)
+    monkeypatch.setattr(
+        starts, "mesh_from_sites", lambda task, sites: coarsened.append(task) or mesh_from_sites(task, sites)
+    )
+    result = anisomesh.remesh(Surface(*SHAPES["tee"]()), n_vertices=120, embedding="direct", threads=1)
+    assert len(coarsened) == 1
+    assert [warning for warning in result.warnings if "separate in the result" in warning]
+    assert result.validity.faults == 0
+
+
+def test_sheets_whose_junctions_are_points_for_the_result_are_remeshed_apart_at_once(monkeypatch):
+    """A fin on an edge of .02, where vertices are .3 apart, or .004 with very many of them."""
+    x = np.concatenate([np.linspace(-1.0, -0.01, 9), np.linspace(0.01, 1.0, 9)])
+    points, faces = square(18, 17, lambda u, v: (np.broadcast_to(x[:, None], u.shape), 2 * v - 1, 0 * u))
+    foot = np.flatnonzero((np.abs(points[:, 0]) < 0.02) & (points[:, 1] == 0.0))
+    surface = Surface(np.vstack([points, [0.0, 0.0, 1.0]]), np.vstack([faces, [*foot, len(points)]]))
+    junctions = cut_at_junctions(anisomesh.prepare(surface))
+    assert not join.are_resolved(junctions, 60)
+    assert join.are_resolved(junctions, 300_000)
+    optimised = []
+    optimise = starts.optimise_sites
+    monkeypatch.setattr(starts, "optimise_sites", lambda *task, **how: optimised.append(task) or optimise(*task, **how))
+    result = anisomesh.remesh(surface, n_vertices=60, embedding="direct", threads=1, max_iterations=10)
+    assert len(optimised) == 1
+    assert [warning for warning in result.warnings if "separate in the result" in warning]
+    assert result.validity.faults == 0

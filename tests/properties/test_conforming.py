@@ -98,6 +98,37 @@ def test_many_loops_in_pairs_are_told_apart():
         assert order[found.points[0] // 16] == loop[0] // 49
 
 
+def comb(n):
+    """A sheet with three tabs whose ends are at one place, in one direction, and where its points are on a flat comb.
+
+    There are n edges along each side of a square of the comb, which is 5 squares wide and 2 high.
+    """
+    flat, faces = square(5 * n + 1, 2 * n + 1, lambda u, v: (5 * u, 2 * v, 0 * u))
+    middle = flat[faces].mean(axis=1)
+    used, faces = np.unique(faces[(middle[:, 1] > 1) | (np.floor(middle[:, 0]) % 2 == 0)], return_inverse=True)
+    flat, faces = flat[used], faces.reshape(-1, 3)
+    u, v = flat[:, 0], flat[:, 1]
+    tab = 2 * np.clip(np.round((u - 0.5) / 2), 0, 2)
+    down = np.clip(1 - v, 0, 1)
+    bend = down**2 * (3 - 2 * down)  # level at both ends
+    bent = np.stack([u + bend * (2 - tab), v, 0.5 * (tab - 2) * (down * (1 - down)) ** 2], axis=1)
+    return flat, Surface(bent, faces)
+
+
+@pytest.mark.parametrize("seed", range(4))
+def test_a_loop_that_passes_three_times_through_one_place_is_placed_in_order(seed):
+    """Uneven faces of the mesh are like now one tab of the surface, now another."""
+    (flat, reference), (coarse, mesh) = comb(12), comb(4)
+    uneven = np.where(mesh.on_boundary[:, None], 0.0, np.random.default_rng(seed).normal(0.0, 0.06, mesh.points.shape))
+    mesh = mesh.with_points(mesh.points + uneven)
+    (loop,) = (each.astype(np.int64) for each in boundary_loops(reference.faces))
+    (found,) = boundary_places(mesh, reference, [loop])
+    corners = np.append(loop, loop[0])
+    start = np.concatenate([[0.0], np.cumsum(np.linalg.norm(np.diff(reference.points[corners], axis=0), axis=1))])
+    there = np.stack([np.interp(found.places, start, flat[corners, axis]) for axis in range(2)], axis=1)
+    assert np.abs(there - coarse[found.points, :2]).max() < 0.15  # an edge is .25 long
+
+
 def test_a_small_loop_of_a_face_that_is_turned_is_placed_in_order():
     reference = Surface(*square(9, 9, lambda u, v: (u, v, 0 * u)))
     (loop,) = (each.astype(np.int64) for each in boundary_loops(reference.faces))

@@ -9,6 +9,7 @@ from hypothesis import strategies as st
 from anisomesh._kernels import decimate as kernels
 from anisomesh._kernels import quadrics
 from anisomesh.bench.methods import METHODS
+from anisomesh.execution.deadline import Deadline
 from anisomesh.features.detect import corners, sharp_edges
 from anisomesh.mesh.closest_points import ClosestPoints
 from anisomesh.mesh.distance import surface_distance
@@ -22,7 +23,7 @@ from anisomesh.mesh.topology import (
     nonmanifold_points,
 )
 from anisomesh.mesh.validity import inverted_faces
-from anisomesh.meshops.decimation import decimate, ends_of_creases
+from anisomesh.meshops.decimation import decimate, decimate_facing, ends_of_creases
 from anisomesh.shapes import analytic as shapes
 from anisomesh.shapes.cad_part import cad_part
 
@@ -264,20 +265,35 @@ def test_ends_of_creases_stay_in_place():
     }
 
 
+def pyramids_and_waves(x, y):
+    ridge = np.minimum(np.abs(8.0 * (x + 1.0) % 2.0 - 1.0), np.abs(8.0 * (y + 1.0) % 2.0 - 1.0))
+    return np.where(x < 0.0, 0.3 * ridge, 0.6 * np.sin(np.pi * x) * np.cos(0.5 * np.pi * y))
+
+
+def nothing_stays(surface):
+    return {"held": np.zeros(surface.n_points, dtype=bool), "crease_edges": np.zeros((0, 2), dtype=np.int64)}
+
+
 @pytest.mark.parametrize("n", [150, 200, 300])
 def test_no_triangle_is_inverted_against_the_reference(n):
     """Steep pyramids beside waves: collapses of least error leave triangles below the tips."""
-
-    def pyramids_and_waves(x, y):
-        ridge = np.minimum(np.abs(8.0 * (x + 1.0) % 2.0 - 1.0), np.abs(8.0 * (y + 1.0) % 2.0 - 1.0))
-        return np.where(x < 0.0, 0.15 * ridge, 0.3 * np.sin(np.pi * x) * np.cos(0.5 * np.pi * y))
-
     sheet = shapes.open_patch(pyramids_and_waves, n=30)
     reference = ClosestPoints(sheet)
-    free, result = (decimate(sheet, n, reference=given).surface for given in (None, reference))
+    free = decimate(sheet, n, moves=False).surface
+    result = decimate_facing(sheet, n, reference, **nothing_stays(sheet)).surface
     assert not inverted_faces(result, reference).any()
     assert result.n_points == n
     assert n > 150 or inverted_faces(free, reference).any()
+
+
+def test_when_time_is_over_it_is_not_repeated_for_inverted_triangles():
+    sheet = shapes.open_patch(pyramids_and_waves, n=30)
+    over = Deadline(limit=1.0, start=-np.inf)
+    free = decimate(sheet, 150, moves=False).surface
+    result = decimate_facing(sheet, 150, ClosestPoints(sheet), **nothing_stays(sheet), deadline=over).surface
+    assert inverted_faces(result, ClosestPoints(sheet)).any()
+    np.testing.assert_array_equal(result.points, free.points)
+    np.testing.assert_array_equal(result.faces, free.faces)
 
 
 @given(seed=st.integers(0, 1_000), share=st.floats(0.1, 0.9))

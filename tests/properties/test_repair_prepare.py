@@ -2,6 +2,7 @@
 
 import os
 from collections import Counter, defaultdict
+from heapq import heappop, heappush
 from itertools import permutations
 from pathlib import Path
 
@@ -160,9 +161,8 @@ def test_fin_on_a_closed_surface_leaves_it_closed():
     assert prepared.report.components == 2
 
 
-@pytest.mark.parametrize("rows", [6, 12, 15])
-@pytest.mark.parametrize("seed", range(3))
-def test_moebius_strip_is_cut_once_across(rows, seed):
+def moebius_strip(rows: int, rng: np.random.Generator) -> Surface:
+    """A strip with one side, of width .6 and three squares across, its faces in any order."""
     angle = 2 * np.pi * np.arange(rows) / rows
     across = np.linspace(-0.3, 0.3, 4)
     ring = 1 + across * np.cos(angle[:, None] / 2)
@@ -171,13 +171,24 @@ def test_moebius_strip_is_cut_once_across(rows, seed):
     number = np.vstack([np.arange(rows * 4).reshape(rows, 4), np.arange(4)[::-1]])
     a, b, c, d = number[:-1, :-1], number[1:, :-1], number[1:, 1:], number[:-1, 1:]
     faces = np.stack([a, b, c, a, c, d], axis=-1).reshape(-1, 3)
-    faces = np.random.default_rng(seed).permutation(faces)
-    strip = Surface(np.stack([x, y, height], axis=-1).reshape(-1, 3), faces)
+    faces = rng.permutation(faces)
+    return Surface(np.stack([x, y, height], axis=-1).reshape(-1, 3), faces)
+
+
+def boundary_length(surface: Surface) -> float:
+    return float(surface.edge_lengths[surface.edge_face_count == 1].sum())
+
+
+@pytest.mark.parametrize("rows", [6, 12, 15])
+@pytest.mark.parametrize("seed", range(3))
+def test_moebius_strip_is_cut_once_straight_across(rows, seed):
+    strip = moebius_strip(rows, np.random.default_rng(seed))
     assert len(topology.boundary_loops(strip.faces)) == 1
     prepared = prepare(strip)
     check(prepared, strip)
     assert prepared.surface.n_faces == strip.n_faces
-    assert prepared.report.edges_nonorientable_cut >= 3
+    assert prepared.report.edges_nonorientable_cut == 3
+    assert boundary_length(prepared.surface) - boundary_length(strip) == pytest.approx(2 * 0.6)  # the strip is .6 wide
     assert topology.euler_characteristic(prepared.surface.faces) > topology.euler_characteristic(strip.faces)
 
 
@@ -196,6 +207,46 @@ def test_klein_bottle_is_cut_into_something_orientable():
     check(prepared, bottle)
     assert prepared.surface.n_faces == bottle.n_faces
     assert n_boundary(prepared.surface) == 2 * prepared.report.edges_nonorientable_cut > 0
+
+
+def shortest_line_across(strip: Surface) -> float:
+    """The length of the shortest path of edges between boundary points that leaves the strip in one piece, by search.
+
+    All simple paths of inner edges are tried in the order of their lengths.
+    """
+    inner = strip.edge_face_count == 2
+    beside = defaultdict(list)
+    for edge in np.flatnonzero(inner).tolist():
+        a, b = strip.edges[edge].tolist()
+        beside[a].append((b, edge))
+        beside[b].append((a, edge))
+    on_boundary = set(strip.edges[~inner].ravel().tolist())
+    waiting = [(0.0, [], [start]) for start in sorted(on_boundary)]
+    while waiting:
+        length, path, points = heappop(waiting)
+        if path and points[-1] in on_boundary:
+            left = inner.copy()
+            left[path] = False
+            if topology.graph_components(strip.edge_faces[left], strip.n_faces)[0] == 1:
+                return length
+            continue
+        for point, edge in beside[points[-1]]:
+            if point not in points:
+                heappush(waiting, (length + float(strip.edge_lengths[edge]), [*path, edge], [*points, point]))
+    raise AssertionError("there is no line across")
+
+
+@pytest.mark.parametrize("seed", range(5))
+def test_an_uneven_moebius_strip_is_cut_along_the_shortest_line_of_edges(seed):
+    rng = np.random.default_rng(seed)
+    flat = moebius_strip(7, rng)
+    strip = flat.with_points(flat.points + 0.08 * rng.standard_normal(flat.points.shape))
+    prepared = prepare(strip)
+    check(prepared, strip)
+    cut = 0.5 * (boundary_length(prepared.surface) - boundary_length(strip))
+    assert cut == pytest.approx(shortest_line_across(strip))
+    again = prepare(Surface(prepared.surface.points, prepared.surface.faces[::-1]))
+    assert boundary_length(again.surface) == pytest.approx(boundary_length(prepared.surface))
 
 
 def test_bow_tie_gets_two_points_for_its_knot():

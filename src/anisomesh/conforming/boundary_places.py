@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from functools import cached_property
-from itertools import pairwise
 
 import numpy as np
 import numpy.typing as npt
@@ -12,17 +11,18 @@ from scipy.optimize import linear_sum_assignment
 from scipy.spatial import cKDTree
 from scipy.spatial.distance import cdist
 
+from anisomesh.conforming.closed_polyline import misfit_of, placed_by_length, placed_on
 from anisomesh.mesh.geometry import unit
 from anisomesh.mesh.surface import Surface
 from anisomesh.mesh.topology import boundary_loops, half_edges
 
 _SPACING = 0.25  # mean edge lengths between samples of the reference; heuristic
 _MAX_SAMPLES = 64  # of one side
+_MAX_MISFIT = 0.5  # mean sides from a point to its place, up to which the order of places is trusted; heuristic
 _MAX_TABLE = 4_000_000  # pairs of sides and samples, up to which the best order is looked for
 _MAX_LOOPS = 1_000  # up to which each is compared with all near ones
 _FAR = 16.0  # squared distance of loops, in edges, that counts as it is: directions differ by 8 at most
 _STARTS = 32  # samples tried for the first side then
-_TURNS = 64  # starts tried of a loop that is placed by its length
 
 Ints = npt.NDArray[np.int64]
 Floats = npt.NDArray[np.float64]
@@ -61,9 +61,10 @@ def boundary_places(mesh: Surface, reference: Surface, loops: list[Ints]) -> lis
     Loops of several sheets can be at the same place. So a side is compared by its place, its normal and the direction
     from it into its face: the nearest side of the reference is found among samples in nine dimensions. A loop belongs
     to the one that most of its sides are at, or, if two would belong to the same one, to the one that makes the sum of
-    all distances least. Its points lie between the places of the sides at them. Where these are not in order, the
-    order along the reference is found that is nearest in all, by dynamic programming; where that does not go around
-    either, as for small loops with faulty faces, they are placed by the length of the loop.
+    all distances least. Its points lie between the places of the sides at them. Where these are not in order, as where
+    a loop passes several times through one place, the order along the reference is found that is nearest in all, by
+    dynamic programming; where that does not go around either, as for small loops with faulty faces, they are placed by
+    the length of the loop.
     """
     found = [loop.astype(np.int64) for loop in boundary_loops(mesh.faces)]
     if len(found) != len(loops):
@@ -78,12 +79,15 @@ def boundary_places(mesh: Surface, reference: Surface, loops: list[Ints]) -> lis
     placed = {}
     for k, number in enumerate(numbers.tolist()):
         own, target = sides.of_loop(k), wanted.of_loop(number)
-        result = _placed(own.start, samples.of_loop(number).nearest(own)[1], target.corners)
-        if result is None:
+        result = placed_on(own.start, samples.of_loop(number).nearest(own)[1], target.corners)
+        misfit = np.inf if result is None else misfit_of(result, own.start, target.corners)
+        if misfit > _MAX_MISFIT * own.lengths.mean():
             finer = _Samples.of(target, float(target.lengths.sum()) / len(own.start))
             if len(own.start) * len(finer.place) <= _MAX_TABLE:
-                result = _placed(own.start, finer.in_order(own), target.corners, forward=True)
-        result = result or _placed_by_length(own, target.corners, samples.scale)
+                other = placed_on(own.start, finer.in_order(own), target.corners, forward=True)
+                if other is not None and misfit_of(other, own.start, target.corners) < misfit:
+                    result = other
+        result = result or placed_by_length(own.start, target.corners, samples.scale)
         if result is None:
             return None
         placed[number] = LoopPlaces(np.roll(found[k], -result[0]), result[1])
@@ -222,73 +226,3 @@ def _argmin_so_far(values: Floats) -> Ints:
     """Return for each of some values (n,) where the lowest one up to it is."""
     lowest = np.minimum.accumulate(values)
     return np.asarray(np.maximum.accumulate(np.where(values == lowest, np.arange(len(values)), 0)))
-
-
-def _placed(points: Floats, sides: Floats, corners: Floats, *, forward: bool = False) -> tuple[int, Floats] | None:
-    """Return the arc lengths (n,) of the points of a loop on a closed polyline (m + 1, 3), ascending.
-
-    ``sides`` are the arc lengths (n,) of the sides that follow each point. They begin at the first of the points behind
-    the start of the polyline, of which the number is returned too. None if the loop does not go around once; with
-    ``forward`` no side is behind the one before it, however far that is.
-    """
-    start = np.concatenate([[0.0], np.cumsum(np.linalg.norm(np.diff(corners, axis=0), axis=1))])
-    total = float(start[-1])
-    shift = 0.0 if forward else 0.5 * total
-    steps = np.mod(sides - np.roll(sides, 1) + shift, total) - shift
-    if len(points) < 3 or abs(steps.sum() - total) > 0.5 * total:
-        return None
-    before = sides[-1] + np.cumsum(steps) - steps
-    placed = np.empty(len(points))
-    for k, (point, low, step) in enumerate(zip(points, before.tolist(), steps.tolist(), strict=True)):
-        placed[k] = _closest(point, low + min(step, 0.0), abs(step), start, corners)
-    return _from_start(np.minimum(np.maximum.accumulate(placed), placed[0] + total), total)
-
-
-def _from_start(placed: Floats, total: float) -> tuple[int, Floats]:
-    """Return which of some ascending arc lengths (n,) around a loop is the first behind its start, and all from it."""
-    turn = np.floor(placed / total)
-    first = int(np.argmax(turn > turn[0])) if turn[-1] > turn[0] else 0
-    return first, np.roll(placed - turn * total, -first)
-
-
-def _placed_by_length(loop: _Sides, corners: Floats, reach: float) -> tuple[int, Floats] | None:
-    """Return the arc lengths (n,) of the points of a loop on a closed polyline (m + 1, 3), by the loop's own length.
-
-    The loop begins where its points come nearest in all. Returned as by :func:`_placed`; None if they are farther off
-    than ``reach`` and their mean distance along the polyline.
-    """
-    start = np.concatenate([[0.0], np.cumsum(np.linalg.norm(np.diff(corners, axis=0), axis=1))])
-    total, n = float(start[-1]), len(loop.start)
-    share = (np.cumsum(loop.lengths) - loop.lengths) / max(float(loop.lengths.sum()), np.finfo(np.float64).tiny)
-    places = total * (np.linspace(0.0, 1.0, _TURNS, endpoint=False)[:, None] + share)
-    at = np.stack([np.interp(places, start, axis, period=total) for axis in corners.T], axis=-1)
-    squares = ((at - loop.start) ** 2).sum(axis=2).mean(axis=1)
-    best = int(np.argmin(squares))
-    return _from_start(places[best], total) if squares[best] <= max(total / n, reach) ** 2 else None
-
-
-def _closest(point: Floats, first: float, length: float, start: Floats, corners: Floats) -> float:
-    """Return the arc length on a closed polyline closest to a point (3,), in an interval that starts at ``first``."""
-    total = float(start[-1])
-    turns = np.floor(first / total) * total
-    first -= turns
-    inner = np.concatenate([start, start[1:] + total])
-    cuts = np.concatenate([[first], inner[(inner > first) & (inner < first + length)], [first + length]])
-    best, nearest = np.inf, first
-    for low, high in pairwise(cuts.tolist()):
-        a, b = _at(low, start, corners), _at(high, start, corners)
-        way = b - a
-        square = float(way @ way)
-        share = min(max(float((point - a) @ way) / square, 0.0), 1.0) if square > 0.0 else 0.0
-        distance = float(np.linalg.norm(a + share * way - point))
-        if distance < best:
-            best, nearest = distance, low + share * (high - low)
-    return float(nearest + turns)
-
-
-def _at(place: float, start: Floats, corners: Floats) -> Floats:
-    """Return the point (3,) of a closed polyline at an arc length."""
-    place = place % float(start[-1])
-    k = min(int(np.searchsorted(start, place, side="right")) - 1, len(start) - 2)
-    length = max(float(start[k + 1] - start[k]), np.finfo(np.float64).tiny)
-    return np.asarray(corners[k] + (place - start[k]) / length * (corners[k + 1] - corners[k]))

@@ -7,7 +7,7 @@ from functools import cached_property
 
 import numpy as np
 
-from anisomesh._arrays import EdgeEnds, Faces, Points, PointScalars, PointTensors, Sites
+from anisomesh._arrays import EdgeEnds, Faces, PointMask, Points, PointScalars, PointTensors, Sites
 from anisomesh.delaunay.delta_complex import simplicial_mesh
 from anisomesh.delaunay.dual import dual_mesh
 from anisomesh.delaunay.faults import points_at_faults
@@ -21,7 +21,7 @@ from anisomesh.mesh.surface import Surface
 from anisomesh.mesh.validity import faulty_faces
 from anisomesh.meshops.anchoring.anchored import anchored
 from anisomesh.meshops.anchors import Anchors
-from anisomesh.meshops.decimation import decimate, ends_of_creases
+from anisomesh.meshops.decimation import decimate_facing, ends_of_creases
 from anisomesh.meshops.edge_recovery import recover_edges
 from anisomesh.meshops.flip import flip_for_shape
 from anisomesh.meshops.held import Held, at_places
@@ -96,6 +96,11 @@ class MeshingTask:
         """Symmetric square roots of the metric (V, 3, 3)."""
         return metric_root(self.tensors)
 
+    def decimated(self, mesh: Surface, n: int, held: PointMask, creases: EdgeEnds) -> tuple[Surface, EdgeEnds]:
+        """Return a mesh and its crease edges decimated to n points, which do not move, if possible."""
+        fewer = decimate_facing(mesh, n, self.reference, held=held, crease_edges=creases, deadline=self.deadline)
+        return fewer.surface, fewer.crease_edges
+
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class ValidMesh:
@@ -154,17 +159,16 @@ def mesh_from_sites(task: MeshingTask, sites: Sites) -> ValidMesh:
        times. The result has more vertices in all only if that makes it valid.
 
     If step 1 or 2 fails (a tube thinner than the distance between sites), the surface, which is valid, is coarsened by
-    the same collapses. The paper inserts sites for every defect and optimises again, which makes new defects.
-
-    Every step is bounded, and steps 4 to 7 keep the topology change by change, so the result is always a manifold with
-    the topology of the surface; :func:`anisomesh.mesh.validity.check_validity` counts the geometric faults left.
+    the same collapses. The paper inserts sites for every defect and optimises again, which makes new defects. Every
+    step is bounded, and steps 4 to 7 keep the topology change by change, so the result is a manifold with the topology
+    of the surface; :func:`anisomesh.mesh.validity.check_validity` counts the geometric faults left.
 
     References
     ----------
     NASM, refinement of the dual; Edelsbrunner, Shah, "Triangulating topological spaces", 1997.
     """
     reference, n_start = task.reference, len(sites)
-    best = trial = _attempt(task, sites, n_start)
+    best = trial = _attempt(task, *_dual_of_sites(task, sites), n_start)
     faulty = bad = faulty_faces(Surface(best.points, best.faces), reference)
     for _ in range(MAX_REPEATS):
         if len(bad) == 0 or trial.from_input or task.deadline.passed():
@@ -174,7 +178,7 @@ def mesh_from_sites(task: MeshingTask, sites: Sites) -> ValidMesh:
         if len(more) == 0:
             break
         sites = np.concatenate([sites, more])
-        trial = _attempt(task, sites, n_start)
+        trial = _attempt(task, *_dual_of_sites(task, sites), n_start)
         bad = faulty_faces(Surface(trial.points, trial.faces), reference)
         as_few = len(trial.points) <= max(task.n_vertices, len(best.points))
         if len(bad) == 0 or (len(bad) < len(faulty) and as_few):
@@ -182,13 +186,15 @@ def mesh_from_sites(task: MeshingTask, sites: Sites) -> ValidMesh:
     return best
 
 
-def _attempt(task: MeshingTask, sites: Sites, n_start: int) -> ValidMesh:
-    """Return the mesh of these sites, of which the first were optimised: steps 1 to 7 of :func:`mesh_from_sites`."""
-    controlled = control_topology(task.voronoi, sites, task.features, task.n_vertices)
-    dual = _dual_in_space(task, controlled)
-    mesh = (
-        dual if dual is not None else _with_anchors(task, FeatureMesh.of(task.surface)) or FeatureMesh.of(task.surface)
-    )
+def mesh_of_dual(task: MeshingTask, sites: Sites) -> ValidMesh | None:
+    """Return the mesh of steps 1 to 7 of :func:`mesh_from_sites`, None if the surface would have to be coarsened."""
+    controlled, dual = _dual_of_sites(task, sites)
+    return None if dual is None else _attempt(task, controlled, dual, len(sites))
+
+
+def _attempt(task: MeshingTask, controlled: ControlledCells, dual: FeatureMesh | None, n_start: int) -> ValidMesh:
+    """Return the mesh of cells, of which the first sites were optimised: steps 4 to 7 of :func:`mesh_from_sites`."""
+    mesh = dual or _with_anchors(task, FeatureMesh.of(task.surface)) or FeatureMesh.of(task.surface)
     n_first = len(mesh.points)
     mesh = _coarsened(task, _without_inverted(task, mesh))
     roots = transfer_metric_roots(task.embedded_reference, task.roots, mesh.points)
@@ -209,6 +215,12 @@ def _attempt(task: MeshingTask, sites: Sites, n_start: int) -> ValidMesh:
         removed=max(n_first - len(points), 0),
         from_input=dual is None,
     )
+
+
+def _dual_of_sites(task: MeshingTask, sites: Sites) -> tuple[ControlledCells, FeatureMesh | None]:
+    """Return the cells of sites and their dual in space, steps 1 to 3."""
+    controlled = control_topology(task.voronoi, sites, task.features, task.n_vertices)
+    return controlled, _dual_in_space(task, controlled)
 
 
 def _dual_in_space(task: MeshingTask, controlled: ControlledCells) -> FeatureMesh | None:
@@ -252,19 +264,16 @@ def _without_inverted(task: MeshingTask, mesh: FeatureMesh) -> FeatureMesh:
 
 def _coarsened(task: MeshingTask, mesh: FeatureMesh) -> FeatureMesh:
     """Return the mesh with no more vertices than asked for, if collapses can do that: step 4."""
-    if len(mesh.points) <= task.n_vertices:
+    if len(mesh.points) <= (n := task.n_vertices):
         return mesh
-    n, reference = task.n_vertices, task.reference
     surface, creases = Surface(mesh.points, mesh.faces), mesh.crease_edges
     anchored = task.anchors.held_in(mesh.points)
     fixed = (mesh.locked | ends_of_creases(creases, surface.n_points)) & ~anchored
     if np.count_nonzero(fixed) <= MAX_FIXED_SHARE * (n - np.count_nonzero(anchored)):
-        coarser = decimate(surface, n, held=mesh.locked, crease_edges=creases, moves=False, reference=reference)
-        surface, creases = coarser.surface, coarser.crease_edges
+        surface, creases = task.decimated(surface, n, mesh.locked, creases)
     if surface.n_points > n:  # fewer than the creases need
         anchored = task.anchors.held_in(surface.points)
-        coarser = decimate(surface, n, held=anchored, moves=False, reference=reference)
-        surface, creases = coarser.surface, coarser.crease_edges
+        surface, creases = task.decimated(surface, n, anchored, creases[:0])
     none = np.zeros(surface.n_points, dtype=bool)
     return _without_inverted(task, FeatureMesh(surface.points, surface.faces, creases, none))
 
@@ -280,15 +289,12 @@ def _without_crossings(task: MeshingTask, mesh: FeatureMesh, tries: int) -> tupl
         if len(points) <= n_wanted:
             break
         stays = (np.arange(len(points)) >= n_wanted) | at_places(points, held)
-        trimmed = decimate(
-            Surface(points, faces), n_wanted, held=stays, crease_edges=creases, moves=False, reference=reference
-        )
-        found = trimmed.surface
+        found, left = task.decimated(Surface(points, faces), n_wanted, stays, creases)
         coarser = remove_self_intersections(
             found.points, found.faces, reference, held=Held(held), max_tries=_TRIM_TRIES, deadline=task.deadline
         )
         if coarser[2] > crossing:
             break
         points, faces, crossing = coarser
-        creases = edges_left(faces, renumbered(found.points, points)[trimmed.crease_edges])
+        creases = edges_left(faces, renumbered(found.points, points)[left])
     return points, faces, creases

@@ -6,6 +6,7 @@ from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
+import numpy.typing as npt
 
 from anisomesh._arrays import EdgeMask, PointLabels, PointMask
 from anisomesh.junctions.graph import JunctionGraph, graph_of
@@ -47,6 +48,13 @@ class Junctions:
     def on_several(self) -> PointMask:
         """Which points of the sheets (V,) are one with others when they are joined."""
         return np.asarray(np.bincount(self.joined)[self.joined] > 1)
+
+    @cached_property
+    def lengths(self) -> npt.NDArray[np.float64]:
+        """The length of each curve (n,)."""
+        where = np.zeros((int(self.joined.max()) + 1, 3))
+        where[self.joined] = self.sheets.points
+        return np.array([np.linalg.norm(np.diff(where[curve], axis=0), axis=1).sum() for curve in self.graph.curves])
 
     @cached_property
     def whole(self) -> Surface:

@@ -19,8 +19,8 @@ from anisomesh.junctions.seam import Seam, seam_along
 from anisomesh.mesh.geometry import Frame, even_edge_length
 from anisomesh.mesh.surface import Surface
 from anisomesh.mesh.topology import edge_keys
+from anisomesh.mesh.validity import faulty_faces
 from anisomesh.meshops.change import apply_changes
-from anisomesh.meshops.decimation import decimate
 from anisomesh.meshops.flip import flip_for_shape
 from anisomesh.meshops.held import Held
 from anisomesh.meshops.inverted import remove_inverted_triangles
@@ -28,22 +28,30 @@ from anisomesh.meshops.split import edge_split, split_longest_edges
 from anisomesh.metric.transfer import transfer_metric_roots
 
 _MAX_CROWDING = 2.0  # vertices of a chain in the length of a mean edge; heuristic
-_MAX_EXCESS = 1.5  # of the vertices asked for, where junctions take more; heuristic
+_MAX_EXCESS = 1.5  # of the vertices asked for, where junctions take more than sheets apart would; heuristic
+_MAX_INVERTED = 10  # triangles of sheets made to conform, of which some stay inverted where there are more; heuristic
+_LEAST_LENGTH = 0.08  # of a curve, in distances of evenly spread vertices; heuristic, chosen on training meshes
+MAX_FAULTS = 3  # of joined sheets, up to which a fit or another start may remove them; heuristic
 _MAX_SETTLING_ROUNDS = 20  # of changes until no edges coincide and the number of vertices is right
 
 Ints = npt.NDArray[np.int64]
 Floats = npt.NDArray[np.float64]
 
 
+def are_resolved(junctions: Junctions, n: int) -> bool:
+    """Return whether n vertices are enough for the junctions to be more than points.
+
+    Where most curves are far shorter than the distance of vertices, as where parts touch by accident, triangles with
+    three vertices at such a place hardly ever fit together.
+    """
+    return bool(np.median(junctions.lengths) >= _LEAST_LENGTH * even_edge_length(junctions.sheets.area, n))
+
+
 def sites_for(junctions: Junctions, n: int) -> int:
     """Return about how many vertices all sheets need, apart, so that n are left when they are joined."""
-    surface, graph = junctions.sheets, junctions.graph
-    spacing = even_edge_length(surface.area, n)
-    where = np.zeros((int(junctions.joined.max()) + 1, 3))
-    where[junctions.joined] = surface.points
+    graph, spacing = junctions.graph, even_edge_length(junctions.sheets.area, n)
     total = float(np.count_nonzero(graph.nodes) - len(np.unique(junctions.joined[graph.nodes])))
-    for curve, copies in zip(graph.curves, graph.copies, strict=True):
-        length = float(np.linalg.norm(np.diff(where[curve], axis=0), axis=1).sum())
+    for length, copies in zip(junctions.lengths.tolist(), graph.copies, strict=True):
         total += (copies - 1) * max(length / spacing - 1.0, 0.0)
     return n + round(total)
 
@@ -58,10 +66,13 @@ class Conforming:
         The mesh.
     seam
         Where it is to be joined.
+    most
+        Vertices that it may have when it is joined.
     """
 
     mesh: ValidMesh
     seam: Seam
+    most: int
 
 
 @dataclass(frozen=True, eq=False)
@@ -88,30 +99,41 @@ class JoinTask:
     def conforming(self, mesh: ValidMesh) -> Conforming | None:
         """Return a mesh of sheets with the same vertices along junctions, as many as wanted in all when joined.
 
-        None if that cannot be done.
+        None if that cannot be done, or only with many faulty triangles.
         """
-        task, sheets = self.task, self.junctions.sheets
-        reference = sheets.with_points(self.frame.to_unit(sheets.points))
-        exact = np.array_equal(reference.points, task.surface.points)
-        found = bundled(Surface(mesh.points, mesh.faces), self.junctions, reference, exact=exact)
-        thinner = None if found is None else _thinned(mesh, found, task)
-        if thinner is not None:
-            mesh = thinner
-            found = bundled(Surface(mesh.points, mesh.faces), self.junctions, reference, exact=exact)
-        if found is None:
+        task, bundles = self.task, self._bundled(mesh)
+        if bundles is None:
             return None
+        mesh, found = bundles
+        most = max(int(_MAX_EXCESS * self.n_vertices), len(mesh.points))
         found = without_narrow_faces(found, task.reference)
         made = conform(found.points, found.faces, found.bundles)
+        if np.count_nonzero(task.reference.inverted(made.points[made.faces])) > _MAX_INVERTED:
+            return None
         seam = seam_along(made.points, made.chains)
         nodes = np.unique(np.concatenate([table[:, [0, -1]].ravel() for table in made.chains]))
         working = task.voronoi.embedded.surface
         lines = working.points[working.edges[task.features.required & (working.edge_face_count == 2)]]
         faces, creases = with_ends_at_nodes(made.points, made.faces, mesh.crease_edges, nodes, lines, task.reference)
         tidy = _tidied(replace(mesh, points=made.points, faces=faces, crease_edges=creases), task)
-        settled = _settled(Conforming(tidy, seam), task, self.n_vertices)
-        if settled is None or seam.join(Surface(settled.points, settled.faces)) is None:
+        settled = _settled(Conforming(tidy, seam, most), task, self.n_vertices)
+        if settled is None:
             return None
-        return Conforming(settled, seam)
+        sheets = Surface(settled.points, settled.faces)
+        fits = seam.join(sheets) is not None and len(faulty_faces(sheets, task.reference)) <= MAX_FAULTS
+        return Conforming(settled, seam, most) if fits else None
+
+    def _bundled(self, mesh: ValidMesh) -> tuple[ValidMesh, Bundled] | None:
+        """Return a mesh without crowded chains, and these; None if its boundary is not the one of the sheets."""
+        sheets = self.junctions.sheets
+        reference = sheets.with_points(self.frame.to_unit(sheets.points))
+        exact = np.array_equal(reference.points, self.task.surface.points)
+        found = bundled(Surface(mesh.points, mesh.faces), self.junctions, reference, exact=exact)
+        thinner = None if found is None else _thinned(mesh, found, self.task)
+        if thinner is not None:
+            mesh = thinner
+            found = bundled(Surface(mesh.points, mesh.faces), self.junctions, reference, exact=exact)
+        return None if found is None else (mesh, found)
 
     def joined(self, conforming: Conforming, fitted: Surface) -> Surface:
         """Return the joined sheets of a mesh as they are fitted, or as they were where that would join more."""
@@ -126,9 +148,8 @@ class JoinTask:
     def apart(self, mesh: ValidMesh) -> ValidMesh:
         """Return a mesh of sheets that are not to be joined, with as many vertices as wanted where possible."""
         sheets, held = Surface(mesh.points, mesh.faces), self.task.anchors.held_in(mesh.points)
-        creases, reference = mesh.crease_edges, self.task.reference
-        fewer = decimate(sheets, self.n_vertices, held=held, crease_edges=creases, moves=False, reference=reference)
-        return replace(mesh, points=fewer.surface.points, faces=fewer.surface.faces, crease_edges=fewer.crease_edges)
+        fewer, creases = self.task.decimated(sheets, self.n_vertices, held, mesh.crease_edges)
+        return replace(mesh, points=fewer.points, faces=fewer.faces, crease_edges=creases)
 
 
 def _thinned(mesh: ValidMesh, found: Bundled, task: MeshingTask) -> ValidMesh | None:
@@ -154,9 +175,8 @@ def _thinned(mesh: ValidMesh, found: Bundled, task: MeshingTask) -> ValidMesh | 
                 stays[inner], surplus = False, surplus + len(inner) - most
     if not surplus:
         return None
-    wanted = sheets.n_points - surplus
-    fewer = decimate(sheets, wanted, held=stays, crease_edges=mesh.crease_edges, moves=False, reference=task.reference)
-    return replace(mesh, points=fewer.surface.points, faces=fewer.surface.faces, crease_edges=fewer.crease_edges)
+    fewer, creases = task.decimated(sheets, sheets.n_points - surplus, stays, mesh.crease_edges)
+    return replace(mesh, points=fewer.points, faces=fewer.faces, crease_edges=creases)
 
 
 def _tidied(mesh: ValidMesh, task: MeshingTask) -> ValidMesh:
@@ -177,11 +197,12 @@ def _settled(conforming: Conforming, task: MeshingTask, n: int) -> ValidMesh | N
     """Return a mesh of sheets changed away from the seam, such that it has n vertices and no new edge when joined.
 
     Edges between the same two vertices of the seam become one when the sheets are joined, and one of them is split, as
-    are edges between two points that become one. Then points are removed or added; if no more can be removed, it may
-    have somewhat more. None if that does not end.
+    are edges between two points that become one. Then points are removed or added, if there is time. If no more can be
+    removed, since that would bring such edges back, it has somewhat more. None if that does not end.
     """
     mesh, seam = conforming.mesh, conforming.seam
     apart = mesh.points[:0]  # points that keep edges from becoming one
+    best, fewest = None, conforming.most + 1
     for _ in range(_MAX_SETTLING_ROUNDS):
         sheets = Surface(mesh.points, mesh.faces)
         joined = seam.joined(sheets)
@@ -189,22 +210,27 @@ def _settled(conforming: Conforming, task: MeshingTask, n: int) -> ValidMesh | N
         if (sheets.edge_face_count[closed] == 1).any():
             return None
         twice, n_joined = _coincident_edges(sheets, seam), int(joined.max()) + 1
-        if len(closed) + len(twice) == 0 and n_joined == n:
-            return mesh
-        if len(closed):
-            places = np.array([place_beside(sheets, edge, task.reference) for edge in closed.tolist()])
-            points, faces = _split_edges(sheets, closed, places)
-        elif len(twice):
-            points, faces = _split_edges(sheets, twice, sheets.points[sheets.edges[twice]].mean(axis=1))
-        if len(closed) + len(twice):
-            apart = np.concatenate([apart, points[sheets.n_points :]])
-            creases = edges_left(faces, mesh.crease_edges)
-        else:
+        if len(closed) + len(twice) == 0:
+            if n_joined == n or task.deadline.passed():
+                return mesh
+            if best is not None and n_joined >= fewest:
+                break
+            if n < n_joined < fewest:
+                best, fewest = mesh, n_joined
             points, faces, creases = _with_count(mesh, task, seam, apart, sheets.n_points + n - n_joined)
             if len(points) == sheets.n_points:
-                return mesh if n < n_joined <= _MAX_EXCESS * n else None
+                break
+        else:
+            split = closed if len(closed) else twice
+            if len(closed):
+                places = np.array([place_beside(sheets, edge, task.reference) for edge in closed.tolist()])
+            else:
+                places = sheets.points[sheets.edges[twice]].mean(axis=1)
+            points, faces = _split_edges(sheets, split, places)
+            apart = np.concatenate([apart, points[sheets.n_points :]])
+            creases = edges_left(faces, mesh.crease_edges)
         mesh = replace(mesh, points=points, faces=faces, crease_edges=creases)
-    return None
+    return best
 
 
 def _coincident_edges(sheets: Surface, seam: Seam) -> Ints:
@@ -236,10 +262,8 @@ def _with_count(
         held = (seam.labels(sheets) >= 0) | task.anchors.held_in(sheets.points)
         again = renumbered(apart, sheets.points)
         held[again[again >= 0]] = True
-        fewer = decimate(
-            sheets, n_points, held=held, crease_edges=mesh.crease_edges, moves=False, reference=task.reference
-        )
-        return fewer.surface.points, fewer.surface.faces, fewer.crease_edges
+        fewer, creases = task.decimated(sheets, n_points, held, mesh.crease_edges)
+        return fewer.points, fewer.faces, creases
     roots = transfer_metric_roots(task.embedded_reference, task.roots, sheets.points)
     kept = np.concatenate([mesh.crease_edges, sheets.edges[seam.on_seam(sheets)]])
     points, faces = split_longest_edges(sheets.points, sheets.faces, n_points, task.reference, roots, kept=kept)

@@ -10,6 +10,7 @@ from anisomesh._arrays import EdgeEnds, PointMask
 from anisomesh._kernels import decimate as kernels
 from anisomesh._kernels.heap import EdgeHeap
 from anisomesh._kernels.stars import Stars
+from anisomesh.execution.deadline import NO_DEADLINE, Deadline
 from anisomesh.mesh.closest_points import ClosestPoints
 from anisomesh.mesh.marked_surface import MarkedSurface
 from anisomesh.mesh.surface import Surface
@@ -46,7 +47,6 @@ def decimate(
     held: PointMask | None = None,
     crease_edges: EdgeEnds | None = None,
     moves: bool = True,
-    reference: ClosestPoints | None = None,
 ) -> Decimated:
     """Collapse edges, the cheapest first, until a number of points is left or none can go.
 
@@ -64,8 +64,6 @@ def decimate(
     moves
         Whether new points may be anywhere; if not, they are points of the surface, and short edges go first where
         distances are small: the mesh has good triangles that are to stay so.
-    reference
-        A surface against which few triangles are to be inverted.
 
     Notes
     -----
@@ -73,8 +71,7 @@ def decimate(
     the boundary and creases, to walls on the edges. The new point is where these are lowest; without moves, and on the
     boundary and on creases, it is one of the two before. A collapse is made if it fulfils the link condition, tilts no
     triangle by more than 78 degrees, and makes none thin. So topology, orientation and boundary loops stay, but
-    triangles may intersect each other. Where some are inverted against the reference, the points there are held, more
-    each time, and all is done again, at most four times and as long as the number of points is reached.
+    triangles may intersect each other.
 
     References
     ----------
@@ -82,17 +79,33 @@ def decimate(
     "Topology preserving edge contraction", 1999.
     """
     creases = np.zeros((0, 2), dtype=np.int64) if crease_edges is None else crease_edges
-    stays = np.zeros(surface.n_points, dtype=bool) if held is None else np.array(held)
-    best = result = _collapsed(surface, n_points, stays, creases, moves=moves)
-    if reference is None:
-        return best
+    stays = np.zeros(surface.n_points, dtype=bool) if held is None else held
+    return _collapsed(surface, n_points, stays, creases, moves=moves)
+
+
+def decimate_facing(
+    surface: Surface,
+    n_points: int,
+    reference: ClosestPoints,
+    *,
+    held: PointMask,
+    crease_edges: EdgeEnds,
+    deadline: Deadline = NO_DEADLINE,
+) -> Decimated:
+    """Collapse edges as :func:`decimate` does without moves, such that few triangles are inverted against a reference.
+
+    Where some are, the points there are held, more each time, and all is done again, at most four times and as long as
+    the number of points is reached. The deadline is asked before each repetition.
+    """
+    stays = np.array(held)
+    best = result = _collapsed(surface, n_points, stays, crease_edges, moves=False)
     least = np.count_nonzero(inverted_faces(surface, reference))
     inverted = fewest = inverted_faces(result.surface, reference)
     for repeat in range(_MAX_REPEATS):
-        if np.count_nonzero(fewest) <= least or result.surface.n_points > best.surface.n_points:
+        if np.count_nonzero(fewest) <= least or result.surface.n_points > best.surface.n_points or deadline.passed():
             break
         stays |= points_near_faces(surface, result.surface, inverted, rings=repeat)
-        result = _collapsed(surface, n_points, stays, creases, moves=moves)
+        result = _collapsed(surface, n_points, stays, crease_edges, moves=False)
         inverted = inverted_faces(result.surface, reference)
         if result.surface.n_points <= best.surface.n_points and inverted.sum() < fewest.sum():
             best, fewest = result, inverted

@@ -14,7 +14,7 @@ from anisomesh.errors import MeshError, OptionError
 from anisomesh.mesh import geometry, topology
 from anisomesh.mesh.surface import Surface
 from anisomesh.mesh.weld import coincident
-from anisomesh.repair import degenerate, duplicates, orientation, t_junctions
+from anisomesh.repair import degenerate, duplicates, one_sided, orientation, t_junctions
 from anisomesh.repair.near_points import weld_distance
 
 logger = logging.getLogger(__name__)
@@ -201,6 +201,8 @@ def _repair_once(surface: Surface, tolerance: float) -> _RepairPass:
     pairs, nonmanifold = orientation.pair_sides(faces, labels[faces])
     areas = 0.5 * np.linalg.norm(geometry.face_cross(surface.points, labels[faces]), axis=1)
     found = orientation.find_orientation(labels[faces], pairs, areas)
+    if found.conflict.any():
+        found = one_sided.with_short_cuts(surface.points, labels[faces], pairs, areas, found)
     faces[found.flip] = faces[found.flip][:, [0, 2, 1]]
     pairs = orientation.renumber_sides(pairs[~found.conflict], found.flip)
     nonmanifold = orientation.renumber_sides(nonmanifold, found.flip)
