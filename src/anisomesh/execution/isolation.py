@@ -3,10 +3,11 @@
 from __future__ import annotations
 
 import os
+import threading
 from collections.abc import Callable
 from concurrent.futures import ProcessPoolExecutor
 from concurrent.futures.process import BrokenProcessPool
-from multiprocessing import get_context
+from multiprocessing import connection, get_context, parent_process
 from typing import ParamSpec, TypeVar
 
 from anisomesh.errors import AnisomeshError
@@ -26,11 +27,12 @@ def isolated(work: Callable[_Arguments, _Result]) -> Callable[_Arguments, _Resul
     Notes
     -----
     The output of the process, including output of C code, is discarded. The function raises the exceptions of ``work``,
-    and :class:`AnisomeshError` if the process ends without a result.
+    and :class:`AnisomeshError` if the process ends without a result. The process ends with the one that called it, also
+    if that is killed.
     """
 
     def call(*args: _Arguments.args, **kwargs: _Arguments.kwargs) -> _Result:
-        with ProcessPoolExecutor(1, mp_context=get_context("spawn"), initializer=_silence) as pool:
+        with ProcessPoolExecutor(1, mp_context=get_context("spawn"), initializer=_begin) as pool:
             try:
                 return pool.submit(work, *args, **kwargs).result()
             except BrokenProcessPool as error:
@@ -39,7 +41,15 @@ def isolated(work: Callable[_Arguments, _Result]) -> Callable[_Arguments, _Resul
     return call
 
 
-def _silence() -> None:
+def _begin() -> None:
+    threading.Thread(target=_end_with_parent, daemon=True).start()
     nowhere = os.open(os.devnull, os.O_WRONLY)
     os.dup2(nowhere, 1)
     os.dup2(nowhere, 2)
+
+
+def _end_with_parent() -> None:
+    parent = parent_process()
+    if parent is not None:
+        connection.wait([parent.sentinel])
+        os._exit(1)
