@@ -19,8 +19,8 @@ _UNCOUNTED: dict[str, Any] = {**_OPTIONS, "_nrt": False}
 def compiling(**options: Any) -> Callable[[Callable[..., Any]], Any]:
     """Return a decorator that compiles a function with these options, once for all values of its arguments.
 
-    Numba compiles a function that is called with a constant, even one in a variable, for this constant as well. That
-    took a fifth of the time of the compilation, and the result is the same.
+    Where a kernel calls another one with a constant, also one in a variable that changes later, Numba compiles that one
+    for the constant, too: more time for the same result.
     """
 
     def decorate(function: Callable[..., Any]) -> Any:
