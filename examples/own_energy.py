@@ -35,10 +35,12 @@ def height_spread(vertices: Any, site: Any, normal: Any, vertex_gradient: Any, s
         mean = (a * a + b * b + c * c + s * s) / 12.0
         total += area * mean
         # the area changes with the corners ...
-        by_u, by_v = mean * (vv * u - uv * v) / (4.0 * area), mean * (uu * v - uv * u) / (4.0 * area)
-        vertex_gradient[k] += by_u
-        vertex_gradient[k + 1] += by_v
-        vertex_gradient[0] -= by_u + by_v
+        for x in range(len(site)):
+            by_u = mean * (vv * u[x] - uv * v[x]) / (4.0 * area)
+            by_v = mean * (uu * v[x] - uv * u[x]) / (4.0 * area)
+            vertex_gradient[k, x] += by_u
+            vertex_gradient[k + 1, x] += by_v
+            vertex_gradient[0, x] -= by_u + by_v
         # ... and the mean with their heights
         vertex_gradient[0, 2] += area * (a + s) / 6.0
         vertex_gradient[k, 2] += area * (b + s) / 6.0

@@ -8,6 +8,7 @@ import anisomesh
 from anisomesh.fitting.arrays import FitTask
 from anisomesh.fitting.fit import FitOptions, fit_mesh
 from anisomesh.fitting.samples import sample_surface
+from anisomesh.io.polygons import PolygonSoup, triangulate
 from anisomesh.learn.inference.predict import predict
 from anisomesh.mesh.closest_points import ClosestPoints
 from anisomesh.meshops.decimation import decimate
@@ -23,7 +24,9 @@ def first():
 
 
 def second():
-    """Run the measures, the network, the decimation and the fit."""
+    """Run the measures, the network, the decimation, the fit, and the triangulation of a concave polygon."""
+    outline = np.array([(0, 0, 0), (3, 0, 0), (3, 3, 0), (2, 3, 0), (2, 1, 0), (1, 1, 0), (1, 3, 0), (0, 3, 0)], float)
+    triangulate(PolygonSoup(points=outline, corners=np.arange(8), sizes=np.array([8])))
     ball = sphere(3)
     anisomesh.evaluate(ball, ball, samples=100)
     predict(ball.with_points(ball.points / ball.diagonal))

@@ -25,7 +25,7 @@ def two_shapes():
 def polar(maps, frames):
     """Return the polar factors of maps (F, 2, k): the local step towards gradients that keep lengths."""
     factors = np.empty_like(maps)
-    local_step(maps, np.tile(np.eye(2), (len(maps), 1, 1)), frames, np.ones(len(maps)), factors)
+    local_step(maps, np.tile(np.eye(2), (len(maps), 1, 1)), np.ascontiguousarray(frames), np.ones(len(maps)), factors)
     return factors
 
 

@@ -1,4 +1,7 @@
-"""Functions of a polygon with their derivatives, whose sum over a diagram is known from elsewhere."""
+"""Functions of a polygon with their derivatives, whose sum over a diagram is known from elsewhere.
+
+They write component by component: assignments of arrays take seconds to compile, for the text of their errors.
+"""
 
 import numba
 import numpy as np
@@ -19,12 +22,14 @@ def plain(vertices, site, normal, vertex_gradient, site_gradient):
         s = p + q + r
         mean = ((p * p).sum() + (q * q).sum() + (r * r).sum() + (s * s).sum()) / 12.0
         total += area * mean
-        du, dv = mean * (vv * u - uv * v) / (4.0 * area), mean * (uu * v - uv * u) / (4.0 * area)
-        dp, dq, dr = area * (p + s) / 6.0, area * (q + s) / 6.0, area * (r + s) / 6.0
-        vertex_gradient[0] += dp - du - dv
-        vertex_gradient[k] += dq + du
-        vertex_gradient[k + 1] += dr + dv
-        site_gradient -= dp + dq + dr
+        for x in range(len(site)):
+            du = mean * (vv * u[x] - uv * v[x]) / (4.0 * area)
+            dv = mean * (uu * v[x] - uv * u[x]) / (4.0 * area)
+            dp, dq, dr = area * (p[x] + s[x]) / 6.0, area * (q[x] + s[x]) / 6.0, area * (r[x] + s[x]) / 6.0
+            vertex_gradient[0, x] += dp - du - dv
+            vertex_gradient[k, x] += dq + du
+            vertex_gradient[k + 1, x] += dr + dv
+            site_gradient[x] -= dp + dq + dr
     return total
 
 
@@ -41,12 +46,15 @@ def height(vertices, site, normal, vertex_gradient, site_gradient):
             continue
         part = 0.5 * np.sqrt(area2)
         area += part
-        du, dv = h * h * (vv * u - uv * v) / (4.0 * part), h * h * (uu * v - uv * u) / (4.0 * part)
-        vertex_gradient[0] -= du + dv
-        vertex_gradient[k] += du
-        vertex_gradient[k + 1] += dv
-    vertex_gradient[0, :3] += 2.0 * area * h * normal
-    site_gradient[:3] -= 2.0 * area * h * normal
+        for x in range(len(site)):
+            du = h * h * (vv * u[x] - uv * v[x]) / (4.0 * part)
+            dv = h * h * (uu * v[x] - uv * u[x]) / (4.0 * part)
+            vertex_gradient[0, x] -= du + dv
+            vertex_gradient[k, x] += du
+            vertex_gradient[k + 1, x] += dv
+    for x in range(3):
+        vertex_gradient[0, x] += 2.0 * area * h * normal[x]
+        site_gradient[x] -= 2.0 * area * h * normal[x]
     return area * h * h
 
 

@@ -58,8 +58,9 @@ def test_a_gradient_without_closed_form_agrees_with_differences():
             edge = vertices[following] - vertices[k]
             length = np.sqrt((edge * edge).sum())
             if length > 0.0:
-                vertex_gradient[following] += edge / length
-                vertex_gradient[k] -= edge / length
+                for x in range(len(site)):
+                    vertex_gradient[following, x] += edge[x] / length
+                    vertex_gradient[k, x] -= edge[x] / length
             total += length
         return total
 

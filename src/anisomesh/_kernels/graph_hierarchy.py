@@ -106,7 +106,7 @@ def transport_to_points(
     """
     for p in range(len(ancestor)):
         i = ancestor[p]
-        transport[p] = _transport(frames[i], normals[i], point_frames[p], point_normals[p])
+        transport[p, 0], transport[p, 1] = _transport(frames[i], normals[i], point_frames[p], point_normals[p])
 
 
 @kernel
@@ -158,9 +158,9 @@ def edge_geometry(
             length = math.sqrt(square)
             values[e, 0], values[e, 1], values[e, 2] = length, -2.0 * rise / square, 2.0 * fall / square
             values[e, 3] = math.sqrt(turn) / length
-            directions[e, 0] = _double_angle(along, across)
-            directions[e, 1] = _double_angle(along_there, across_there)
-            transport[e] = _transport(frames[j], normals[j], frames[i], normals[i])
+            directions[e, 0, 0], directions[e, 0, 1] = _double_angle(along, across)
+            directions[e, 1, 0], directions[e, 1, 1] = _double_angle(along_there, across_there)
+            transport[e, 0], transport[e, 1] = _transport(frames[j], normals[j], frames[i], normals[i])
 
 
 @kernel

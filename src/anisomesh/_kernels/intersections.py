@@ -14,7 +14,7 @@ order, and is row ``2**l - 1 + m`` of ``nodes``.
 import numpy as np
 
 from .compiled import inlined, kernel
-from .orientation import orient2d, orient3d
+from .orientation import choose_axes, orient2d, orient3d
 
 
 @kernel
@@ -271,21 +271,50 @@ def find_pairs(begin, points, faces, axes, boxes, slabs, nodes, depth, stack, pa
     return n, written
 
 
+@inlined
+def _coincide(points, p, q):
+    """Return whether two points have equal coordinates."""
+    return points[p, 0] == points[q, 0] and points[p, 1] == points[q, 1] and points[p, 2] == points[q, 2]
+
+
+@inlined
+def _write_box(points, faces, f, boxes):
+    """Write the bounding box of a face, a row of three lower and three upper bounds."""
+    a = faces[f, 0]
+    b = faces[f, 1]
+    c = faces[f, 2]
+    for x in range(3):
+        boxes[f, x] = min(points[a, x], points[b, x], points[c, x])
+        boxes[f, x + 3] = max(points[a, x], points[b, x], points[c, x])
+
+
 @kernel
-def count_pairs_from(first, points, faces, axes, boxes):
+def count_pairs_from(first, points, faces, axes, boxes, pair, pair_axes):
     """Return the number of intersecting pairs of which one face has the number ``first`` or a higher one.
 
-    Every such face is compared with all before it, which suits a few among some hundred faces. Faces (F, 3) with a
-    negative axis (F,) are ignored; boxes (F, 6) need not be in the order of a tree.
+    Every such face is compared with all before it, which suits a few among some hundred faces. Points with equal
+    coordinates are the same one, faces (F, 3) without area are ignored. ``axes`` (F,), ``boxes`` (F, 6), ``pair``
+    (2, 3) and ``pair_axes`` (2,) are workspaces.
     """
+    choose_axes(points, faces, axes)
+    for f in range(len(faces)):
+        _write_box(points, faces, f, boxes)
     count = 0
     for face in range(first, len(faces)):
+        if axes[face] < 0:
+            continue
+        pair_axes[0] = axes[face]
+        for k in range(3):
+            pair[0, k] = faces[face, k]
         for other in range(face):
-            if (
-                axes[face] >= 0
-                and axes[other] >= 0
-                and _overlap(boxes, face, boxes, other)
-                and faces_intersect(points, faces, axes, face, other)
-            ):
+            if axes[other] < 0 or not _overlap(boxes, face, boxes, other):
+                continue
+            pair_axes[1] = axes[other]
+            for m in range(3):
+                pair[1, m] = faces[other, m]
+                for k in range(3):
+                    if _coincide(points, pair[0, k], faces[other, m]):
+                        pair[1, m] = pair[0, k]
+            if faces_intersect(points, pair, pair_axes, 0, 1):
                 count += 1
     return count

@@ -128,7 +128,8 @@ def local_step(jacobian: Maps, root: Maps, frames: Maps, areas: Vector, target: 
     total = 0.0
     for f in range(len(jacobian)):
         for row in range(2):
-            plane[0, row, :3] = frames[f, row]
+            for c in range(3):  # an assignment of arrays would take seconds to compile, for the text of its errors
+                plane[0, row, c] = frames[f, row, c]
             for c in range(k):
                 product[0, row, c] = root[f, row, 0] * jacobian[f, 0, c] + root[f, row, 1] * jacobian[f, 1, c]
         _write_polar(product, plane, 0, first, second, factor)

@@ -10,7 +10,7 @@ import numpy.typing as npt
 from scipy.sparse import csr_array
 
 from anisomesh._arrays import FaceMask, FaceVectors, Points
-from anisomesh.mesh.geometry import corner_angles, unit
+from anisomesh.mesh.geometry import corner_angles, cross, unit
 from anisomesh.mesh.intersections import Pairs, self_intersections
 from anisomesh.mesh.surface import Surface
 from anisomesh.mesh.topology import edge_keys
@@ -80,7 +80,7 @@ class ClosestPoints:
         Triangles without area and triangles perpendicular to the surface are not inverted. Where two sheets of the
         surface coincide with opposite orientations, a triangle may face either of them.
         """
-        normals = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
+        normals = cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
         return np.asarray(self._cosines(normals, corners.mean(axis=1)) < -_NORMAL_ROUNDING)
 
     def clearly_facing(self, corners: Vectors) -> FaceMask:
@@ -92,7 +92,7 @@ class ClosestPoints:
         triangle's size, or the distance of the barycentre from the surface if that is less: on the face of a plate
         thinner than a hundredth of the triangle nothing is in doubt.
         """
-        normals = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
+        normals = cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
         centre = corners.mean(axis=1)
         offset = _NORMAL_OFFSET * np.sqrt(np.linalg.norm(normals, axis=1))
         at_centre = self._cosines(normals, centre)
@@ -195,11 +195,11 @@ def barycentric(corners: npt.NDArray[np.float64], points: Points) -> npt.NDArray
     In a triangle without area, only the two ends of its longest side have weights.
     """
     sides = corners[:, [2, 0, 1]] - corners[:, [1, 2, 0]]
-    normal = np.cross(sides[:, 1], sides[:, 2])
+    normal = cross(sides[:, 1], sides[:, 2])
     squared = np.einsum("nx,nx->n", normal, normal)
     length_squared = np.einsum("ncx,ncx->nc", sides, sides)
     to_corners = corners - points[:, None, :]
-    parts = np.cross(to_corners[:, [1, 2, 0]], to_corners[:, [2, 0, 1]])
+    parts = cross(to_corners[:, [1, 2, 0]], to_corners[:, [2, 0, 1]])
     weights = np.einsum("ncx,nx->nc", parts, normal)
     flat = squared <= _FLAT_SQUARED_RATIO * length_squared.max(axis=1) ** 2
     weights = np.maximum(np.where(flat[:, None], 0.0, weights), 0.0)
@@ -222,8 +222,8 @@ def squared_distances_to(corners: Vectors, points: Vectors) -> npt.NDArray[np.fl
     fraction = np.divide(fraction, length_squared, out=np.zeros_like(fraction), where=length_squared > 0.0)
     to_sides = to_point - np.clip(fraction, 0.0, 1.0)[:, :, None] * sides
     squared = np.einsum("ncx,ncx->nc", to_sides, to_sides).min(axis=1)
-    normal = unit(np.cross(sides[:, 0], sides[:, 1]))
-    inside = (np.einsum("ncx,nx->nc", np.cross(sides, to_point), normal) >= 0.0).all(axis=1) & normal.any(axis=1)
+    normal = unit(cross(sides[:, 0], sides[:, 1]))
+    inside = (np.einsum("ncx,nx->nc", cross(sides, to_point), normal) >= 0.0).all(axis=1) & normal.any(axis=1)
     height = np.einsum("nx,nx->n", to_point[:, 0], normal)
     return np.asarray(np.where(inside, height**2, squared))
 

@@ -14,10 +14,21 @@ from anisomesh._arrays import Faces, FaceVectors, Points, PointVectors, Vector3
 _FLAT_THICKNESS = 1e-8  # area over squared longest side; thinner triangles have normals that are rounding; heuristic
 
 
+def cross(a: npt.NDArray[np.float64], b: npt.NDArray[np.float64]) -> npt.NDArray[np.float64]:
+    """Return the cross products (..., 3) of vectors (..., 3): what :func:`numpy.cross` does, several times as fast."""
+    ax, ay, az = a[..., 0], a[..., 1], a[..., 2]
+    bx, by, bz = b[..., 0], b[..., 1], b[..., 2]
+    product = np.empty(np.broadcast_shapes(a.shape, b.shape))
+    product[..., 0] = ay * bz - az * by
+    product[..., 1] = az * bx - ax * bz
+    product[..., 2] = ax * by - ay * bx
+    return product
+
+
 def face_cross(points: Points, faces: Faces) -> FaceVectors:
     """Return the cross products (F, 3) of two sides of each face: unit normal times twice the area."""
     a, b, c = points[faces[:, 0]], points[faces[:, 1]], points[faces[:, 2]]
-    return np.asarray(np.cross(b - a, c - a))
+    return cross(b - a, c - a)
 
 
 def unit(vectors: npt.NDArray[np.float64]) -> npt.NDArray[np.float64]:
@@ -29,7 +40,7 @@ def unit(vectors: npt.NDArray[np.float64]) -> npt.NDArray[np.float64]:
 def thickness(corners: npt.NDArray[np.float64]) -> npt.NDArray[np.float64]:
     """Return area over squared longest side (n,) of triangles (n, 3, 3): 0 if degenerate, 0.433 if equilateral."""
     sides = corners - corners[:, [1, 2, 0]]
-    area = 0.5 * np.linalg.norm(np.cross(sides[:, 0], sides[:, 1]), axis=1)
+    area = 0.5 * np.linalg.norm(cross(sides[:, 0], sides[:, 1]), axis=1)
     longest = (sides**2).sum(axis=2).max(axis=1)
     return np.asarray(np.divide(area, longest, out=np.zeros_like(area), where=longest > 0.0))
 
@@ -43,7 +54,7 @@ def corner_angles(corners: npt.NDArray[np.float64]) -> npt.NDArray[np.float64]:
     """Return the corner angles (n, 3), in radians, of triangles (n, 3, 3); 0 beside a side of length zero."""
     ahead = unit(corners[:, [1, 2, 0]] - corners)
     back = unit(corners[:, [2, 0, 1]] - corners)
-    sine = np.linalg.norm(np.cross(ahead, back), axis=2)
+    sine = np.linalg.norm(cross(ahead, back), axis=2)
     return np.asarray(np.arctan2(sine, np.einsum("fcx,fcx->fc", ahead, back)))
 
 

@@ -8,7 +8,7 @@ import numpy.typing as npt
 from anisomesh._arrays import Faces, Points
 from anisomesh._kernels import intersections as kernels
 from anisomesh._kernels.orientation import choose_axes
-from anisomesh.mesh.geometry import unit
+from anisomesh.mesh.geometry import cross, unit
 from anisomesh.mesh.surface import Surface
 from anisomesh.mesh.weld import coincident
 
@@ -85,10 +85,10 @@ def count_intersections_from(first: int, points: Points, faces: Faces) -> int:
     points, faces
         A mesh (V, 3), (F, 3).
     """
-    points, faces = _scaled(points), coincident(points)[faces]
-    axes = np.empty(len(faces), dtype=np.int8)
-    choose_axes(points, faces, axes)
-    return int(kernels.count_pairs_from(first, points, faces, axes, _boxes(points, faces)))
+    n = len(faces)
+    axes, boxes = np.empty(n, dtype=np.int8), np.empty((n, 6))
+    pair, pair_axes = np.empty((2, 3), dtype=np.int32), np.empty(2, dtype=np.int8)
+    return int(kernels.count_pairs_from(first, _scaled(points), faces, axes, boxes, pair, pair_axes))
 
 
 def _scaled(points: Points) -> Points:
@@ -117,7 +117,7 @@ def _slabs(points: Points, faces: Faces) -> npt.NDArray[np.float64]:
     corners = points[faces]
     sides = corners[:, [2, 0, 1]] - corners[:, [1, 2, 0]]
     longest = np.argmax(np.linalg.norm(sides, axis=2), axis=1)
-    direction = unit(np.cross(np.cross(sides[:, 1], sides[:, 2]), sides[np.arange(len(faces)), longest]))
+    direction = unit(cross(cross(sides[:, 1], sides[:, 2]), sides[np.arange(len(faces)), longest]))
     heights = np.einsum("fcx,fx->fc", corners, direction)
     low, high = heights.min(axis=1) - _SLAB_MARGIN, heights.max(axis=1) + _SLAB_MARGIN
     return np.concatenate([direction, low[:, None], high[:, None]], axis=1)

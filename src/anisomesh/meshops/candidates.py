@@ -29,10 +29,11 @@ def flips(patch: Patch) -> list[Change]:
 
 def moves_to_average(patch: Patch) -> Iterator[Change]:
     """Yield moves of a corner to the average of its neighbours on the surface, off it, and half the way."""
-    for point in patch.movable:
-        average = patch.surface.points[_ring(patch, point)].mean(axis=0)
-        places = [on_surface(patch, average[None])[0], average, 0.5 * (average + patch.surface.points[point])]
-        yield from _moves(patch, point, places)
+    points, corners = patch.surface.points, patch.movable
+    average = np.array([points[_ring(patch, corner)].mean(axis=0) for corner in corners]).reshape(-1, 3)
+    nearest = on_surface(patch, average)
+    for k, corner in enumerate(corners):
+        yield from _moves(patch, corner, [nearest[k], average[k], 0.5 * (average[k] + points[corner])])
 
 
 def moves_on_side(patch: Patch) -> Iterator[Change]:
@@ -132,7 +133,7 @@ def points_on_side(patch: Patch, points: Points, normals: Floats) -> Points:
 
 
 def _ring(patch: Patch, point: int) -> Ints:
-    return np.setdiff1d(patch.surface.faces[patch.star(point)], [point])
+    return np.array(sorted({*patch.surface.faces[patch.star(point)].ravel().tolist()} - {point}))
 
 
 def _moves(patch: Patch, point: int, places: Floats | list[Floats]) -> Iterator[Change]:

@@ -196,7 +196,10 @@ class _Search:
 
 def _allowed(source: Candidates, start: _Round, patch: Patch) -> list[Change]:
     """Return the changes of a source that leave the faces as they are that stay."""
-    return [change for change in source(patch) if (patch.faces[change.gone] >= start.n_held_faces).all()]
+    changes = list(source(patch))
+    if start.n_held_faces == 0:
+        return changes
+    return [change for change in changes if (patch.faces[change.gone] >= start.n_held_faces).all()]
 
 
 def _best_change(patch: Patch, source: Candidates, objective: Objective, *, allow_equal: bool) -> Change | None:

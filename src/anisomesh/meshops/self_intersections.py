@@ -99,6 +99,8 @@ class _NewIntersections:
         return np.asarray((~gone[:, pairs].any(axis=2)).sum(axis=1))
 
     def count_after(self, patch: Patch, change: Change, bound: int) -> int:
-        others = np.delete(patch.surface.faces, change.gone, axis=0)
+        stays = np.ones(patch.surface.n_faces, dtype=bool)
+        stays[change.gone] = False
+        others = patch.surface.faces[stays]
         faces = np.concatenate([others, change.new.astype(np.int32)])
         return bound + count_intersections_from(len(others), change.points_after(patch.surface.points), faces)
