@@ -8,6 +8,7 @@ from anisomesh._kernels import (
     decimate,
     diagram,
     fit_moves,
+    fit_planes,
     fit_samples,
     fit_splits,
     graph_hierarchy,
@@ -38,6 +39,7 @@ _FIT = (  # exchanges of edges compile more, where there are any
     fit_samples.average_roots,
     fit_samples.fit_error,
     fit_samples.quality_sum,
+    fit_planes.face_planes,
     fit_splits.split_gains,
 )
 _DECIMATE = (decimate.set_quadrics, decimate.decimate)
