@@ -29,7 +29,8 @@ if TYPE_CHECKING:
     from anisomesh.features.network import trace_features
     from anisomesh.io.meshes import load, load_mesh, save
     from anisomesh.learn.inference.source import Hybrid, Neural
-    from anisomesh.levels import Levels, remesh_levels, save_levels
+    from anisomesh.levels.model import Levels
+    from anisomesh.levels.remesh import remesh_levels
     from anisomesh.mesh.embedded_surface import EmbeddedSurface
     from anisomesh.mesh.surface import Surface
     from anisomesh.metric.field import MetricField
@@ -46,9 +47,8 @@ if TYPE_CHECKING:
 _MODULE_OF = {
     # the main job
     "remesh": "pipeline",
-    "remesh_levels": "levels",
-    "Levels": "levels",
-    "save_levels": "levels",
+    "remesh_levels": "levels.remesh",
+    "Levels": "levels.model",
     "RemeshOptions": "options",
     "RemeshResult": "result",
     "StepInfo": "execution.progress",
@@ -143,7 +143,6 @@ __all__ = [
     "remesh_levels",
     "sample",
     "save",
-    "save_levels",
     "save_rvd",
     "trace_features",
     "transfer_attributes",

@@ -46,8 +46,30 @@ from anisomesh.starts import MadeMesh, MeshTask, valid_mesh
 logger = logging.getLogger(__name__)
 
 
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Manner:
+    """What a remesh with a number of vertices begins with, and what counts.
+
+    Attributes
+    ----------
+    nearest
+        Whether the distance counts more than the shape.
+    asked
+        The length of edges in the metric, if that was asked for.
+    finer
+        A mesh with more vertices to begin with, None for a random start.
+    """
+
+    nearest: bool = False
+    asked: float | None = None
+    finer: Finer | None = None
+
+
+_PLAIN = Manner()
+
+
 @dataclass(frozen=True, eq=False)
-class Remeshed:
+class RemeshedLevel:
     """A result, and what a coarser level of detail takes over from it, None if nothing."""
 
     result: RemeshResult
@@ -125,13 +147,13 @@ def remesh(
 
         def with_vertices(n: int) -> RemeshResult:
             run.on_step(StepInfo(stage="search", message=f"{n:,} vertices"))
-            return remeshed(n, options, run, nearest=True).result
+            return remeshed(n, options, run, Manner(nearest=True)).result
 
         result = smallest_within(with_vertices, prepared, max_error, deadline, least=cut.least)
         result = replace(result, warnings=(*unused_metric(options), *result.warnings))
     elif n_vertices is None and ratio is None:
         n = max(cut.least, cut.n_more + count_for_length(cut.rest, options, run))
-        result = remeshed(n, options, run, asked=options.absolute_length).result
+        result = remeshed(n, options, run, Manner(asked=options.absolute_length)).result
     else:
         n = n_vertices or max(MIN_VERTICES, round((ratio or 0.0) * prepared.n_points))
         result = remeshed(n, options, run).result
@@ -165,15 +187,17 @@ def with_attributes(result: RemeshResult, given: Mesh, cut: Cut, options: Remesh
     return replace(result, mesh=mesh, seconds=run.total_seconds(), warnings=warnings)
 
 
-def joined_or_apart(given: Mesh, cut: Cut, n: int, options: RemeshOptions, run: Run, **how: Any) -> Remeshed:
+def joined_or_apart(
+    given: Mesh, cut: Cut, n: int, options: RemeshOptions, run: Run, manner: Manner = _PLAIN
+) -> RemeshedLevel:
     """Remesh a prepared surface with n vertices, its sheets joined at junctions; apart if that has fewer faults."""
-    joined = _remesh(cut, n, options, run, **how)
+    joined = _remesh(cut, n, options, run, manner)
     if joined is not None:
         late = run.deadline.share(OPTIMISATION_SHARE).passed()
         if cut.rest.junctions is None or not joined.result.validity.faults or late:
             return joined
     logger.info("the sheets cannot be joined well with %d vertices, and are remeshed apart", n)
-    apart = _remesh(cut_input(given, options, run, joined=False), n, options, run, **how)
+    apart = _remesh(cut_input(given, options, run, joined=False), n, options, run, manner)
     if apart is None:
         raise AssertionError("a mesh without junctions was not joined")
     if joined is None or apart.result.validity.faults < joined.result.validity.faults:
@@ -181,26 +205,13 @@ def joined_or_apart(given: Mesh, cut: Cut, n: int, options: RemeshOptions, run: 
     return joined
 
 
-def _remesh(
-    cut: Cut,
-    n: int,
-    options: RemeshOptions,
-    run: Run,
-    *,
-    nearest: bool = False,
-    asked: float | None = None,
-    finer: Finer | None = None,
-) -> Remeshed | None:
-    """Remesh what is not locked, such that the whole has n vertices; None if sheets cannot be joined.
-
-    ``nearest`` if the distance counts more than the shape, ``asked`` is the length of edges in the metric if that was
-    asked for, and ``finer`` is a mesh with more vertices to begin with.
-    """
+def _remesh(cut: Cut, n: int, options: RemeshOptions, run: Run, manner: Manner) -> RemeshedLevel | None:
+    """Remesh what is not locked, such that the whole has n vertices; None if sheets cannot be joined."""
     source, prepared = cut.rest, cut.whole.prepared
     n_rest, junctions = cut.count_of_rest(n), source.junctions
     n_sites = n_rest if junctions is None else sites_for(junctions, n_rest)
-    tasks = set_up(source, n_sites, options, run, nearest=nearest, finer=finer)
-    measured, task = tasks.measured, tasks.dual
+    tasks = set_up(source, n_sites, options, run, nearest=manner.nearest, finer=manner.finer)
+    measured, task, asked = tasks.measured, tasks.dual, manner.asked
     frame, field = measured.frame, measured.field
     if tasks.start is None:
         run.check_time()
@@ -252,7 +263,7 @@ def _remesh(
         ),
         feature_distance=made.feature_distance * frame.scale,
     )
-    return Remeshed(result, Finer(tasks, optimised.sites))
+    return RemeshedLevel(result, Finer(tasks, optimised.sites))
 
 
 def _said_of_mesh(made: MadeMesh, tasks: Tasks) -> tuple[str, ...]:

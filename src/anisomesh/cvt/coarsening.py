@@ -11,7 +11,7 @@ from anisomesh.cvt.energy import Energy, evaluate_energy
 from anisomesh.cvt.lloyd import lloyd
 from anisomesh.voronoi.restricted import RestrictedVoronoi
 
-_REACH = 2.0  # spacings of the sites that are left, from which on a neighbour costs nothing; Yuksel 2015
+_FREE_DISTANCE = 2.0  # spacings of the sites that are left, from which on a neighbour costs nothing; Yuksel 2015
 _POWER = 8  # of the price; the same
 _NEIGHBOURS = 4.0  # neighbours looked at for each site that one of those left stands for, beside a few; heuristic
 _LEAST_NEIGHBOURS = 8
@@ -75,7 +75,7 @@ def _eliminated(sites: Sites, spacing: Floats, n: int) -> Ints:
     _, first = np.unique(np.minimum(one, other) * count + np.maximum(one, other), return_index=True)
     first = first[one[first] != other[first]]
     one, other, distance = one[first], other[first], distance[first]
-    price = np.maximum(1.0 - distance / (0.5 * _REACH * (spacing[one] + spacing[other])), 0.0) ** _POWER
+    price = np.maximum(1.0 - distance / (0.5 * _FREE_DISTANCE * (spacing[one] + spacing[other])), 0.0) ** _POWER
     return _left(count, n, one, other, price)
 
 

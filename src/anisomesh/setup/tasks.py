@@ -25,7 +25,7 @@ from anisomesh.metric.field import MetricField
 from anisomesh.metric.thin_walls import separate_thin_walls
 from anisomesh.metric.transfer import PlacedMetric
 from anisomesh.options import RemeshOptions
-from anisomesh.resolve import cvt_options, embedder, fit_plan, follows_creases, prescribes_sizes
+from anisomesh.resolve import cvt_options, embedder, fit_plan, follows_creases, is_designed, prescribes_sizes
 from anisomesh.setup.inputs import PreparedInput
 from anisomesh.setup.measured import Measured, coarser, measure
 from anisomesh.voronoi.restricted import RestrictedVoronoi
@@ -114,7 +114,6 @@ def set_up(
             embedded = finer.tasks.dual.voronoi.embedded
         else:
             embedded = EmbeddedSurface(working, embedding.points, embedding.scale, density)
-        start = None if finer is None else _start(finer, embedded, n, options)
         task = MeshingTask(
             voronoi=RestrictedVoronoi(embedded, threads=options.threads),
             features=_features(embedded, n, split.tagged, measured.tips, options),
@@ -125,6 +124,7 @@ def set_up(
             error_weights=weights,
             anchors=source.anchors(n, measured.frame),
         )
+        start = None if finer is None else _start(finer, task, options)
         plan = fit_plan(options, surface, nearest=nearest)
         if plan is not None and source.junctions is not None:  # a decimation of sheets would not fit together
             plan = replace(plan, decimation=None)
@@ -146,15 +146,20 @@ def set_up(
     )
 
 
-def _start(finer: Finer, embedded: EmbeddedSurface, n: int, options: RemeshOptions) -> Sites | None:
-    """Return n of the sites (n, d) of a finer mesh, in another embedding of the same surface; None for too few."""
-    sites, own = finer.sites, finer.tasks.dual.voronoi.embedded
-    if len(sites) <= n:
+def _start(finer: Finer, task: MeshingTask, options: RemeshOptions) -> Sites | None:
+    """Return as many sites (n, d) of a finer mesh as a task takes, in its embedding; None if there are too few.
+
+    On measured surfaces they are denser where so many sites have more energy. On designed ones that says too little:
+    cells across a crease have nearly all of the energy until their sites are on it.
+    """
+    sites, own, embedded = finer.sites, finer.tasks.dual.voronoi.embedded, task.voronoi.embedded
+    if len(sites) <= task.n_vertices:
         return None
-    if embedded.points is not own.points:
+    if embedded is not own:
         sites = embedded.points[cKDTree(own.points).query(sites)[1]]
     energy = cvt_options(options, sized=prescribes_sizes(options)).resampling_energy
-    return spread_subset(RestrictedVoronoi(embedded, threads=options.threads), sites, n, energy)
+    energy = None if is_designed(task.surface) else energy
+    return spread_subset(RestrictedVoronoi(embedded, threads=options.threads), sites, task.n_vertices, energy)
 
 
 def _with_density(field: MetricField, density: PointScalars | None, surface: Surface) -> MetricField:

@@ -17,7 +17,7 @@ if TYPE_CHECKING:
     from collections.abc import Sequence
 
     from anisomesh.attributes.model import Mesh
-    from anisomesh.levels import Levels
+    from anisomesh.levels.model import Levels
     from anisomesh.mesh.surface import Surface
 
 _SAMPLES = 50_000  # points on each surface, for the distances of the table
@@ -51,7 +51,7 @@ class LevelOutputs(Outputs):
     @property
     def paths(self) -> list[Path]:
         """The requested files, in the order of writing."""
-        from anisomesh.io.levels import level_paths
+        from anisomesh.levels.files import level_paths
 
         own = level_paths(self.mesh, self.levels, self.mesh_format)
         return [*own, *(path for path in (self.report, self.picture) if path is not None)]
@@ -77,17 +77,15 @@ class LevelOutputs(Outputs):
 
     def check_new(self) -> None:
         """Raise typer.BadParameter if a file of a level exists already."""
-        from anisomesh.io.levels import level_paths
+        from anisomesh.levels.files import level_paths
 
         for path in level_paths(self.mesh, self.levels, self.mesh_format):
             check_not_there(path, self.mesh)
 
     def write(self, result: Levels, facts: dict[str, Any], display: Display) -> None:  # type: ignore[override]
         """Write the levels, all or none of them, then the other files."""
-        from anisomesh.levels import save_levels
-
         display.note(f"writing {', '.join(str(path) for path in self.paths)}")
-        save_levels(result, self.mesh, file_format=self.mesh_format)
+        result.save(self.mesh, file_format=self.mesh_format)
         if self.report is not None:
             write_json(facts, self.report)
         if self.picture is not None:
@@ -108,7 +106,7 @@ def run_levels(
     """Remesh to levels of detail with progress and return them and their report; see :func:`run_remesh` for both."""
     from importlib.metadata import version
 
-    from anisomesh.levels import remesh_levels
+    from anisomesh.levels.remesh import remesh_levels
 
     announce_remesh(display, options)
     levels = remesh_levels(mesh, on_step=display, **options)

@@ -1,81 +1,32 @@
-"""Levels of detail: one mesh with several numbers of vertices, each level made from the next finer one."""
+"""The remesh to levels of detail, each of which begins with sites of the next finer one."""
 
 from __future__ import annotations
 
 import logging
 import os
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 from contextlib import nullcontext
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from itertools import pairwise
-from pathlib import Path
-from typing import Any, overload
-
-import numpy.typing as npt
+from typing import Any
 
 from anisomesh.counts.target import read_levels
 from anisomesh.errors import OptionError
 from anisomesh.execution.deadline import Deadline
 from anisomesh.execution.progress import OnStep, StepInfo, ignore_steps
 from anisomesh.execution.run import Run
-from anisomesh.io.describe import html_table
-from anisomesh.io.levels import save_meshes
 from anisomesh.io.meshes import mesh_of
+from anisomesh.levels.model import Levels
 from anisomesh.options import MIN_VERTICES, RemeshOptions, with_overrides
-from anisomesh.pipeline import Remeshed, cut_input, joined_or_apart, with_attributes
+from anisomesh.pipeline import Manner, RemeshedLevel, cut_input, joined_or_apart, with_attributes
 from anisomesh.result import RemeshResult
 from anisomesh.setup.lock import Cut
 
 logger = logging.getLogger(__name__)
 
 
-@dataclass(frozen=True, eq=False)
-class Levels(Sequence[RemeshResult]):
-    """Levels of detail, from the finest to the coarsest; a sequence of :class:`~anisomesh.result.RemeshResult`.
-
-    Attributes
-    ----------
-    results
-        The levels. Each has its own seconds; what is computed once for all is in the seconds of the first.
-    """
-
-    results: tuple[RemeshResult, ...]
-
-    def __len__(self) -> int:
-        return len(self.results)
-
-    @overload
-    def __getitem__(self, index: int) -> RemeshResult: ...
-
-    @overload
-    def __getitem__(self, index: slice) -> tuple[RemeshResult, ...]: ...
-
-    def __getitem__(self, index: int | slice) -> RemeshResult | tuple[RemeshResult, ...]:
-        return self.results[index]
-
-    def __iter__(self) -> Iterator[RemeshResult]:
-        return iter(self.results)
-
-    def __repr__(self) -> str:
-        counts = ", ".join(f"{level.surface.n_points:,}" for level in self)
-        return f"Levels({counts} vertices, {self.seconds:.1f} s)"
-
-    def _repr_html_(self) -> str:
-        return html_table("Levels", [(f"level {k}", repr(level)) for k, level in enumerate(self)])
-
-    @property
-    def seconds(self) -> float:
-        """Wall-clock seconds of all levels together."""
-        return sum(level.seconds["total"] for level in self)
-
-    def report(self) -> dict[str, Any]:
-        """Return the figures of all levels as a dictionary that JSON can hold."""
-        return {"levels": [level.report() for level in self], "seconds": self.seconds}
-
-
 def remesh_levels(
     mesh: Any,
-    faces: npt.NDArray[Any] | None = None,
     *,
     n_vertices: Sequence[int] | None = None,
     ratios: Sequence[float] | None = None,
@@ -87,8 +38,8 @@ def remesh_levels(
 
     Parameters
     ----------
-    mesh, faces
-        As for :func:`~anisomesh.pipeline.remesh`.
+    mesh
+        As for :func:`~anisomesh.pipeline.remesh`; arrays as ``Surface(points, faces)``.
     n_vertices
         Vertices of each level, at least 4, no two the same, in any order.
     ratios
@@ -124,48 +75,22 @@ def remesh_levels(
     total = Deadline(options.time_limit)
     run = Run(on_step or ignore_steps, total)
     with run.stage("load") if isinstance(mesh, str | os.PathLike) else nullcontext():
-        given = mesh_of(mesh, faces)
+        given = mesh_of(mesh)
     cut = cut_input(given, options, run)
     if counts is None:
         counts = [max(MIN_VERTICES, round(share * cut.whole.surface.n_points)) for share in shares or []]
     counts = _checked(counts, cut)
     results: list[RemeshResult] = []
-    level: Remeshed | None = None
+    level: RemeshedLevel | None = None
     for k, n in enumerate(counts):
         run = run if k == 0 else Run(run.on_step, Deadline())
         run.deadline = _deadline_of(total, run.deadline, counts[k:])
         run.on_step(StepInfo(stage="level", message=f"{k}: {n:,} vertices"))
-        level = joined_or_apart(given, cut, n, options, run, finer=None if level is None else level.finer)
+        level = joined_or_apart(given, cut, n, options, run, Manner(finer=None if level is None else level.finer))
         result = replace(level.result, warnings=cut.remarks) if cut.is_all else level.result
         results.append(with_attributes(result, given, cut, options, run) if options.attributes else result)
         logger.info("level %d: %r", k, results[-1])
     return Levels(tuple(results))
-
-
-def save_levels(levels: Levels, path: str | os.PathLike[str], *, file_format: str | None = None) -> list[Path]:
-    """Write levels of detail with everything that they carry, all or none of their files.
-
-    Parameters
-    ----------
-    levels
-        The levels.
-    path
-        For ``out.ply`` the files are ``out.lod0.ply``, ``out.lod1.ply``, ..., the finest first. A ``.glb`` file holds
-        all levels, by the extension MSFT_lod; :func:`~anisomesh.io.meshes.load` reads the finest of them.
-    file_format
-        The format, such as ``"ply"``, if the extension does not name it.
-
-    Returns
-    -------
-    list of Path
-        The files that were written.
-
-    Raises
-    ------
-    MeshFileError
-        As for :func:`~anisomesh.io.meshes.save`.
-    """
-    return save_meshes([level.mesh for level in levels], path, file_format=file_format)
 
 
 def _checked(counts: Sequence[int], cut: Cut) -> list[int]:

@@ -54,7 +54,7 @@ def save_meshes(meshes: Sequence[Mesh], path: str | os.PathLike[str], *, file_fo
     -----
     Levels in OBJ share one material file, named as ``path``. What the format cannot hold is said once, of the finest.
     """
-    paths, suffix = level_paths(path, len(meshes), file_format), known_suffix(path, file_format)
+    paths, suffix = level_paths(path, len(meshes), file_format), known_suffix(Path(path), file_format)
     losses = Losses()
     each = [losses, *(Losses() for _ in meshes[1:])]
     with atomic_paths(paths) as temporaries:
