@@ -172,7 +172,7 @@ def cvt_options(options: RemeshOptions, *, sized: bool = False, warm: bool = Fal
     """Return how sites are optimised.
 
     ``sized`` if their numbers per area are prescribed, so that none are sampled anew; ``warm`` if they begin with sites
-    of a finer level of detail, so that fewer steps are enough, and none misses what that has found.
+    of a finer level of detail, so that fewer steps are enough.
     """
     wanted, final = energy(options), options.final_sharpness
     resampling: Energy | None = wanted
@@ -182,7 +182,7 @@ def cvt_options(options: RemeshOptions, *, sized: bool = False, warm: bool = Fal
         energy=wanted,
         final_energy=None if final is None else NormalMetric(final),
         resampling_energy=resampling,
-        relocate=follows_creases(options) and not warm,
+        relocate=follows_creases(options),
         lloyd_iterations=min(options.lloyd_iterations, _WARM_LLOYD) if warm else options.lloyd_iterations,
         max_iterations=min(_max_iterations(options), _WARM_ITERATIONS) if warm else _max_iterations(options),
         seed=options.seed,
