@@ -29,6 +29,8 @@ if TYPE_CHECKING:
     from anisomesh.features.network import trace_features
     from anisomesh.io.meshes import load, load_mesh, save
     from anisomesh.learn.inference.source import Hybrid, Neural
+    from anisomesh.levels.model import Levels
+    from anisomesh.levels.remesh import remesh_levels
     from anisomesh.mesh.embedded_surface import EmbeddedSurface
     from anisomesh.mesh.surface import Surface
     from anisomesh.metric.field import MetricField
@@ -45,6 +47,8 @@ if TYPE_CHECKING:
 _MODULE_OF = {
     # the main job
     "remesh": "pipeline",
+    "remesh_levels": "levels.remesh",
+    "Levels": "levels.model",
     "RemeshOptions": "options",
     "RemeshResult": "result",
     "StepInfo": "execution.progress",
@@ -106,6 +110,7 @@ __all__ = [
     "EnergyValue",
     "Evaluation",
     "Hybrid",
+    "Levels",
     "Mesh",
     "MeshError",
     "MeshFileError",
@@ -135,6 +140,7 @@ __all__ = [
     "precomputed_embedding",
     "prepare",
     "remesh",
+    "remesh_levels",
     "sample",
     "save",
     "save_rvd",

@@ -5,7 +5,7 @@ from __future__ import annotations
 import logging
 import os
 from contextlib import nullcontext
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from functools import partial
 from typing import Any
 
@@ -40,10 +40,40 @@ from anisomesh.result import RemeshResult
 from anisomesh.setup.inputs import prepared_input, with_split_sides
 from anisomesh.setup.lock import Cut, cut_locked
 from anisomesh.setup.measured import count_for_length, unit_of_lengths
-from anisomesh.setup.tasks import Tasks, set_up
+from anisomesh.setup.tasks import Finer, Tasks, set_up
 from anisomesh.starts import MadeMesh, MeshTask, valid_mesh
 
 logger = logging.getLogger(__name__)
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Manner:
+    """What a remesh with a number of vertices begins with, and what counts.
+
+    Attributes
+    ----------
+    nearest
+        Whether the distance counts more than the shape.
+    asked
+        The length of edges in the metric, if that was asked for.
+    finer
+        A mesh with more vertices to begin with, None for a random start.
+    """
+
+    nearest: bool = False
+    asked: float | None = None
+    finer: Finer | None = None
+
+
+_PLAIN = Manner()
+
+
+@dataclass(frozen=True, eq=False)
+class RemeshedLevel:
+    """A result, and what a coarser level of detail takes over from it, None if nothing."""
+
+    result: RemeshResult
+    finer: Finer | None
 
 
 def remesh(
@@ -110,37 +140,37 @@ def remesh(
     n_vertices, ratio, max_error = read_target(n_vertices, ratio, max_error, options)
     with run.stage("load") if isinstance(mesh, str | os.PathLike) else nullcontext():
         given = mesh_of(mesh, faces)
-    cut = _cut(given, options, run, joined=True)
-    prepared, remeshed = cut.whole.surface, partial(_joined_or_apart, given, cut)
+    cut = cut_input(given, options, run)
+    prepared, remeshed = cut.whole.surface, partial(joined_or_apart, given, cut)
     if max_error is not None:
         options = replace(options, denoise=False)  # the distance asked for refers to the input itself
 
         def with_vertices(n: int) -> RemeshResult:
             run.on_step(StepInfo(stage="search", message=f"{n:,} vertices"))
-            return remeshed(n, options, run, nearest=True)
+            return remeshed(n, options, run, Manner(nearest=True)).result
 
         result = smallest_within(with_vertices, prepared, max_error, deadline, least=cut.least)
         result = replace(result, warnings=(*unused_metric(options), *result.warnings))
     elif n_vertices is None and ratio is None:
         n = max(cut.least, cut.n_more + count_for_length(cut.rest, options, run))
-        result = remeshed(n, options, run, asked=options.absolute_length)
+        result = remeshed(n, options, run, Manner(asked=options.absolute_length)).result
     else:
         n = n_vertices or max(MIN_VERTICES, round((ratio or 0.0) * prepared.n_points))
-        result = remeshed(n, options, run)
+        result = remeshed(n, options, run).result
     if cut.is_all:
         result = replace(result, warnings=cut.remarks)
     elif n_vertices is None and ratio is None:
         result = replace(result, warnings=(*lengths_beyond(prepared, options, max_error), *result.warnings))
-    return _with_attributes(result, given, cut, options, run) if options.attributes else result
+    return with_attributes(result, given, cut, options, run) if options.attributes else result
 
 
-def _cut(given: Mesh, options: RemeshOptions, run: Run, *, joined: bool) -> Cut:
+def cut_input(given: Mesh, options: RemeshOptions, run: Run, *, joined: bool = True) -> Cut:
     """Return the prepared mesh without what is locked, cut at its junctions if sheets are to be joined there."""
     with run.stage("prepare"):
         return cut_locked(prepared_input(given, options, joined=joined), given, options)
 
 
-def _with_attributes(result: RemeshResult, given: Mesh, cut: Cut, options: RemeshOptions, run: Run) -> RemeshResult:
+def with_attributes(result: RemeshResult, given: Mesh, cut: Cut, options: RemeshOptions, run: Run) -> RemeshResult:
     """Return a result with everything that a mesh carries."""
     if given.is_bare:
         return result
@@ -157,45 +187,39 @@ def _with_attributes(result: RemeshResult, given: Mesh, cut: Cut, options: Remes
     return replace(result, mesh=mesh, seconds=run.total_seconds(), warnings=warnings)
 
 
-def _joined_or_apart(given: Mesh, cut: Cut, n: int, options: RemeshOptions, run: Run, **how: Any) -> RemeshResult:
+def joined_or_apart(
+    given: Mesh, cut: Cut, n: int, options: RemeshOptions, run: Run, manner: Manner = _PLAIN
+) -> RemeshedLevel:
     """Remesh a prepared surface with n vertices, its sheets joined at junctions; apart if that has fewer faults."""
     junctions, joined = cut.rest.junctions, None
     if junctions is None or cut.locked.any() or are_resolved(junctions, cut.count_of_rest(n)):
-        joined = _remesh(cut, n, options, run, **how)
+        joined = _remesh(cut, n, options, run, manner)
     if joined is not None:
         late = run.deadline.share(OPTIMISATION_SHARE).passed()
-        if junctions is None or not joined.validity.faults or late:
+        if junctions is None or not joined.result.validity.faults or late:
             return joined
     logger.info("the sheets cannot be joined well with %d vertices, and are remeshed apart", n)
-    apart = _remesh(_cut(given, options, run, joined=False), n, options, run, **how)
+    apart = _remesh(cut_input(given, options, run, joined=False), n, options, run, replace(manner, finer=None))
     if apart is None:
         raise AssertionError("a mesh without junctions was not joined")
-    return apart if joined is None or apart.validity.faults < joined.validity.faults else joined
+    if joined is None or apart.result.validity.faults < joined.result.validity.faults:
+        return replace(apart, finer=None if joined is None else joined.finer)
+    return joined
 
 
-def _remesh(
-    cut: Cut,
-    n: int,
-    options: RemeshOptions,
-    run: Run,
-    *,
-    nearest: bool = False,
-    asked: float | None = None,
-) -> RemeshResult | None:
-    """Remesh what is not locked, such that the whole has n vertices; None if sheets cannot be joined.
-
-    ``nearest`` if the distance counts more than the shape, and ``asked`` is the length of edges in the metric if that
-    was asked for.
-    """
+def _remesh(cut: Cut, n: int, options: RemeshOptions, run: Run, manner: Manner) -> RemeshedLevel | None:
+    """Remesh what is not locked, such that the whole has n vertices; None if sheets cannot be joined."""
     source, prepared = cut.rest, cut.whole.prepared
     n_rest, junctions = cut.count_of_rest(n), source.junctions
-    tasks = set_up(source, n_rest if junctions is None else sites_for(junctions, n_rest), options, run, nearest=nearest)
-    measured, task = tasks.measured, tasks.dual
+    n_sites = n_rest if junctions is None else sites_for(junctions, n_rest)
+    tasks = set_up(source, n_sites, options, run, nearest=manner.nearest, finer=manner.finer)
+    measured, task, asked = tasks.measured, tasks.dual, manner.asked
     frame, field = measured.frame, measured.field
-    run.check_time()
+    if tasks.start is None:
+        run.check_time()
     order = task.voronoi.embedded.face_order
     join = None if junctions is None else JoinTask(task, junctions, frame, n_rest)
-    made = valid_mesh(MeshTask(task, tasks.fit, join), measured.options, run)
+    made = valid_mesh(MeshTask(task, tasks.fit, join, tasks.start), measured.options, run)
     if made is None:
         return None
     mesh, optimised = made.mesh, made.optimised
@@ -203,7 +227,7 @@ def _remesh(
     agreement = _agreement(mesh, tasks, asked) if asked or task.error_weights is not None else None
     rest, reference = (Surface(source.to_model(each.points, frame), each.faces) for each in (mesh, measured.surface))
     surface, validity = cut.checked(rest, reference, made.validity, run.deadline)
-    return RemeshResult(
+    result = RemeshResult(
         surface=surface,
         mesh=Mesh(surface=surface),
         prepared=cut.whole.surface,
@@ -241,6 +265,7 @@ def _remesh(
         ),
         feature_distance=made.feature_distance * frame.scale,
     )
+    return RemeshedLevel(result, Finer(tasks, optimised.sites))
 
 
 def _said_of_mesh(made: MadeMesh, tasks: Tasks) -> tuple[str, ...]:

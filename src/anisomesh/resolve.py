@@ -27,6 +27,7 @@ _RESAMPLING_FACTOR = 1.5  # sharpness of the energy by which sites are sampled a
 _NEAREST = FitOptions(price=4.0, exchange_price=0.25, rounds=5, share=0.1)  # chosen on training meshes
 _NEAREST_DECIMATION = FitOptions(price=10.0, exchange_price=2.0, rounds=3, min_quality=0.8)  # chosen on them too
 _ITERATIONS, _ITERATIONS_BEFORE_FIT = 150, 50  # of L-BFGS at most; the second from training meshes
+_WARM_LLOYD, _WARM_ITERATIONS = 2, 16  # the same from sites of a finer level of detail; chosen on training meshes
 _BUILT_IN: dict[str, Callable[[float], MetricSource]] = {
     "curvature": lambda crease_angle: Curvature(crease_angle=crease_angle),
     "approximation": lambda crease_angle: Approximation(crease_angle=crease_angle),
@@ -167,8 +168,12 @@ def is_fitted(options: RemeshOptions) -> bool:
     return options.fit and isinstance(energy(options), NormalMetric)
 
 
-def cvt_options(options: RemeshOptions, *, sized: bool = False) -> CVTOptions:
-    """Return how sites are optimised; ``sized`` if their numbers per area are prescribed, so none are sampled anew."""
+def cvt_options(options: RemeshOptions, *, sized: bool = False, warm: bool = False) -> CVTOptions:
+    """Return how sites are optimised.
+
+    ``sized`` if their numbers per area are prescribed, so that none are sampled anew; ``warm`` if they begin with sites
+    of a finer level of detail, so that fewer steps are enough.
+    """
     wanted, final = energy(options), options.final_sharpness
     resampling: Energy | None = wanted
     if isinstance(wanted, NormalMetric):
@@ -178,8 +183,8 @@ def cvt_options(options: RemeshOptions, *, sized: bool = False) -> CVTOptions:
         final_energy=None if final is None else NormalMetric(final),
         resampling_energy=resampling,
         relocate=follows_creases(options),
-        lloyd_iterations=options.lloyd_iterations,
-        max_iterations=_max_iterations(options),
+        lloyd_iterations=min(options.lloyd_iterations, _WARM_LLOYD) if warm else options.lloyd_iterations,
+        max_iterations=min(_max_iterations(options), _WARM_ITERATIONS) if warm else _max_iterations(options),
         seed=options.seed,
     )
 

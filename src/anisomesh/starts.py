@@ -31,11 +31,15 @@ MAX_STARTS = 3  # of the optimisation, with one seed after the other, for a mesh
 
 @dataclass(frozen=True, eq=False)
 class MeshTask:
-    """How a mesh is made from sites, what it is fitted to, and how its sheets are joined; None if that is not done."""
+    """How a mesh is made from sites, what it is fitted to, and how its sheets are joined; None if that is not done.
+
+    ``start`` are positions (S, d) with which the first try begins in place of random ones.
+    """
 
     dual: MeshingTask
     fit: FitTarget | None
     join: JoinTask | None
+    start: Sites | None = None
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -51,12 +55,13 @@ class MadeMesh:
 
 
 def valid_mesh(task: MeshTask, options: RemeshOptions, run: Run) -> MadeMesh | None:
-    """Return the mesh of a task; from the next seeds while it has faults that the input does not explain.
+    """Return the mesh of a task; from other random starts while it has faults that the input does not explain.
 
     None if its sheets cannot be joined.
     """
     best = made = _mesh_of_start(task, options, run)
-    for seed in range(options.seed + 1, options.seed + MAX_STARTS):
+    first = options.seed + (task.start is None)
+    for seed in range(first, first + MAX_STARTS - 1):
         if best is None or made is None or not best.validity.faults or run.deadline.passed():
             break
         if task.join is not None and best.validity.faults > MAX_FAULTS:
@@ -64,7 +69,7 @@ def valid_mesh(task: MeshTask, options: RemeshOptions, run: Run) -> MadeMesh | N
         if made.validity.self_intersections_input > 0 or made.mesh.from_input:
             break
         fresh = replace(task.dual, voronoi=RestrictedVoronoi(task.dual.voronoi.embedded, threads=options.threads))
-        made = _mesh_of_start(replace(task, dual=fresh), replace(options, seed=seed), run)
+        made = _mesh_of_start(replace(task, dual=fresh, start=None), replace(options, seed=seed), run)
         if made is not None and made.validity.faults < best.validity.faults:
             best = made
     return best
@@ -78,8 +83,9 @@ def _mesh_of_start(start: MeshTask, options: RemeshOptions, run: Run) -> MadeMes
             task.voronoi,
             task.n_vertices,
             task.features,
-            cvt_options(options, sized=task.error_weights is not None),
+            cvt_options(options, sized=task.error_weights is not None, warm=start.start is not None),
             feedback=DualFeedback(partial(dual_squared_errors, weights=task.error_weights), missing_on_creases),
+            start=start.start,
             on_step=run.on_step,
             deadline=run.deadline.share(OPTIMISATION_SHARE),
         )

@@ -25,7 +25,15 @@ def stretch_along_z():
 
 
 def test_every_example_is_tested():
-    tested = {"remesh_a_surface", "own_metric", "gallery", "noisy_scan", "carry_data", "adapt_to_a_solution"}
+    tested = {
+        "remesh_a_surface",
+        "own_metric",
+        "gallery",
+        "noisy_scan",
+        "carry_data",
+        "adapt_to_a_solution",
+        "levels_of_detail",
+    }
     tutorials = {"own_metric_source", "own_energy", "own_embedder", "stages", "learn_a_metric"}
     assert {path.stem for path in FOLDER.glob("*.py")} == tested | tutorials
 
@@ -146,3 +154,11 @@ def test_adapting_to_a_solution_lowers_its_error_at_the_same_number_of_vertices(
     assert adapted[1] < even / 4
     assert capsys.readouterr().out.count("400 vertices") == 3
     assert (tmp_path / "adapted.png").stat().st_size > 10_000
+
+
+@pytest.mark.slow
+def test_levels_of_detail_are_in_one_file(tmp_path, capsys):
+    levels = example("levels_of_detail").main(tmp_path / "knot.glb", ratios=(0.1, 0.05))
+    assert [level.surface.n_points for level in levels] == [320, 160]
+    assert len(capsys.readouterr().out.splitlines()) == 2
+    assert [path.name for path in tmp_path.iterdir()] == ["knot.glb"]

@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any, BinaryIO
 
 import typer
 
-from anisomesh.cli.progress import Display, announce_compilation
+from anisomesh.cli.progress import Display, announce_remesh
 from anisomesh.cli.report import write_json
 
 if TYPE_CHECKING:
@@ -94,6 +94,10 @@ class Outputs:
         if self.picture is not None:
             check_picture_path(self.picture, "--picture")
 
+    def check_new(self) -> None:
+        """Raise typer.BadParameter if the mesh, for which no name was given, exists already."""
+        check_not_there(self.mesh, self.mesh)
+
     def write(self, result: RemeshResult, facts: dict[str, Any], display: Display) -> None:
         """Write the files, each to a temporary file that is renamed when it is complete."""
         from anisomesh.io.meshes import save
@@ -129,7 +133,7 @@ def default_output(source: Path, input_format: str | None, output_format: str | 
     Raises
     ------
     typer.BadParameter
-        If the input is standard input or has no known suffix, or the file exists: it is replaced only if it is named.
+        If the input is standard input or has no known suffix.
     """
     if source == STANDARD_STREAM:
         raise typer.BadParameter("give -o OUT: standard input has no name to make one from")
@@ -137,10 +141,13 @@ def default_output(source: Path, input_format: str | None, output_format: str | 
     if given is None:
         check_format(source.suffix, str(source))
     suffix = source.suffix if given is None else "." + given.lower().removeprefix(".")
-    path = source.parent / f"{source.stem}_remeshed{suffix}"
+    return source.parent / f"{source.stem}_remeshed{suffix}"
+
+
+def check_not_there(path: Path, out: Path) -> None:
+    """Raise typer.BadParameter if a file that was not named exists; ``out`` is the name that replaces it."""
     if path.exists():
-        raise typer.BadParameter(f"{path} exists; give -o {path} to replace it, or another name")
-    return path
+        raise typer.BadParameter(f"{path} exists; give -o {out} to replace it, or another name")
 
 
 def check_format(name: str, where: str) -> None:
@@ -263,10 +270,8 @@ def run_remesh(
         The input, in model units.
     display
         Shows the progress.
-    name
-        Name of the input, for the report.
-    load_seconds
-        Time of reading the input, in seconds.
+    name, load_seconds
+        Name of the input and time of reading it, in seconds, for the report.
     **options
         Arguments of :func:`anisomesh.pipeline.remesh`.
 
@@ -277,22 +282,9 @@ def run_remesh(
     """
     from importlib.metadata import version
 
-    from anisomesh.options import RemeshOptions
     from anisomesh.pipeline import remesh
-    from anisomesh.resolve import embedding_name
 
-    source = RemeshOptions(
-        **{name: options[name] for name in ("metric", "embedding", "weights", "fit") if name in options}
-    )
-    named = isinstance(source.metric, str) and source.metric == "approximation"
-    nearest = named or options.get("max_error") is not None
-    works = [
-        "remesh",
-        *(["fit"] if source.fit else []),
-        *(["decimate"] if source.fit and nearest else []),
-        *(["network"] if embedding_name(source) in ("neural", "hybrid") else []),
-    ]
-    announce_compilation(display, *works)
+    announce_remesh(display, options)
     result = remesh(mesh, on_step=display, **options)
     report = result.report()
     seconds = report["seconds"]

@@ -14,6 +14,7 @@ import typer
 from anisomesh.cli import benchmark, dataset, demo, evaluate, info, train
 from anisomesh.cli.figures import group as figure
 from anisomesh.cli.log import logs
+from anisomesh.cli.ratios import RatiosCommand
 from anisomesh.cli.remeshing.command import command as remesh_command
 from anisomesh.cli.spelling import as_options
 from anisomesh.errors import AnisomeshError
@@ -27,7 +28,7 @@ app = typer.Typer(
     pretty_exceptions_enable=False,
     context_settings={"help_option_names": ["-h", "--help"]},
 )
-app.command("remesh")(logs(remesh_command))
+app.command("remesh", cls=RatiosCommand)(logs(remesh_command))
 app.command("evaluate")(logs(evaluate.command))
 app.add_typer(figure.app, name="figure")
 app.command("info")(logs(info.command))

@@ -6,7 +6,7 @@ import sys
 import time
 from contextlib import AbstractContextManager
 from types import TracebackType
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
     from anisomesh.execution.progress import StepInfo
@@ -20,6 +20,7 @@ _STAGE_LABELS = {
     "fit": "fitting them to the input",
     "attributes": "carrying attributes over",
     "search": "searching the number of vertices",
+    "level": "level of detail",
 }
 _SECONDS_BETWEEN_LINES = 5.0  # heuristic
 
@@ -131,3 +132,22 @@ def announce_compilation(display: Display, *works: str) -> None:
 
     if not all(map(kernels_cached, works)):
         display.note("compiling the numeric kernels (once per installation, one to two minutes) ...")
+
+
+def announce_remesh(display: Display, options: dict[str, Any]) -> None:
+    """Announce the compilation of the kernels that a remesh with some options needs, unless they are cached."""
+    from anisomesh.options import RemeshOptions
+    from anisomesh.resolve import embedding_name
+
+    source = RemeshOptions(
+        **{name: options[name] for name in ("metric", "embedding", "weights", "fit") if name in options}
+    )
+    named = isinstance(source.metric, str) and source.metric == "approximation"
+    nearest = named or options.get("max_error") is not None
+    works = [
+        "remesh",
+        *(["fit"] if source.fit else []),
+        *(["decimate"] if source.fit and nearest else []),
+        *(["network"] if embedding_name(source) in ("neural", "hybrid") else []),
+    ]
+    announce_compilation(display, *works)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Iterable
 
 from anisomesh._values import real_number, whole_number
 from anisomesh.errors import OptionError
@@ -32,7 +33,31 @@ def read_target(
         if not (math.isfinite(length) and length > 0.0):
             raise OptionError(f"max_error = {length}; expected a positive length in model units")
         return None, None, length
-    share = real_number("ratio", ratio)
+    return None, _share("ratio", ratio), None
+
+
+def read_levels(
+    n_vertices: object, ratios: object, options: RemeshOptions
+) -> tuple[list[int] | None, list[float] | None]:
+    """Return the numbers of vertices of levels of detail, or their ratios, whichever is given, as numbers in range."""
+    if (n_vertices is None) == (ratios is None):
+        raise OptionError("give the levels either as n_vertices or as ratios, such as ratios=[1, 0.5, 0.2]")
+    if options.edge_length is not None:
+        raise OptionError("edge_length says how many vertices one mesh has; leave it out with levels of detail")
+    name, values = ("n_vertices", n_vertices) if ratios is None else ("ratios", ratios)
+    if isinstance(values, str) or not isinstance(values, Iterable):
+        raise OptionError(f"{name} = {values!r}; expected a list with a number for each level")
+    listed = list(values)
+    if not listed:
+        raise OptionError(f"{name} is empty; expected a number for each level")
+    if ratios is None:
+        return [whole_number(f"{name}[{k}]", value, MIN_VERTICES) for k, value in enumerate(listed)], None
+    return None, [_share(f"{name}[{k}]", value) for k, value in enumerate(listed)]
+
+
+def _share(name: str, value: object) -> float:
+    """Return a number as vertices per vertex of the input, or raise OptionError."""
+    share = real_number(name, value)
     if not 0.0 < share <= _LARGEST_RATIO:
-        raise OptionError(f"ratio = {share}; expected a positive number, such as 0.2 for a fifth of the vertices")
-    return None, share, None
+        raise OptionError(f"{name} = {share}; expected a positive number, such as 0.2 for a fifth of the vertices")
+    return share

@@ -87,10 +87,11 @@ def optimise_sites(
     options: CVTOptions,
     *,
     feedback: DualFeedback | None = None,
+    start: Sites | None = None,
     on_step: OnStep = ignore_steps,
     deadline: Deadline = NO_DEADLINE,
 ) -> Optimised:
-    """Return optimised sites: a random start, Lloyd's algorithm, then L-BFGS on the energy.
+    """Return optimised sites: a start, random or given, Lloyd's algorithm, then L-BFGS on the energy.
 
     Parameters
     ----------
@@ -104,6 +105,8 @@ def optimise_sites(
         How sites are optimised.
     feedback
         What the dual tells about sites; without it no site is relocated.
+    start
+        Positions (S, d) to begin with in place of random ones; they are not sampled anew.
     on_step
         Called after every iteration.
     deadline
@@ -115,7 +118,10 @@ def optimise_sites(
     def report(iteration: int, energy: float) -> None:
         on_step(StepInfo(stage="cvt", iteration=done + iteration, total=total, energy=energy))
 
-    sites = ConstrainedSites.free(_start(voronoi, n_sites, options, report))
+    if start is None:
+        sites = ConstrainedSites.free(_start(voronoi, n_sites, options, report))
+    else:
+        sites = ConstrainedSites.free(lloyd(voronoi, start, options.lloyd_iterations, report))
     done = options.lloyd_iterations
     iterations = evaluations = 0
     for stage, (energy, limit) in enumerate(stages):

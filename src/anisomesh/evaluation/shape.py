@@ -13,6 +13,7 @@ from anisomesh.mesh.closest_points import ClosestPoints
 from anisomesh.mesh.geometry import corner_angles
 from anisomesh.mesh.surface import Surface
 from anisomesh.mesh.working_surface import working_surface
+from anisomesh.metric.field import MetricField
 from anisomesh.metric.quality import anisotropic_quality
 from anisomesh.metric.sources import Curvature
 from anisomesh.metric.transfer import transfer_to_corners
@@ -75,12 +76,22 @@ def quality_in_reference_metric(reference: Surface, surface: Surface) -> FaceSca
     ----------
     NASM, section 4.1; see :func:`anisomesh.metric.quality.anisotropic_quality`.
     """
+    return quality_in_metric(*reference_metric(reference), surface)
+
+
+def reference_metric(reference: Surface) -> tuple[ClosestPoints, MetricField]:
+    """Return the curvature metric of a reference, at bounding-box diagonal 1, and the surface on which it is known."""
     identity = np.broadcast_to(np.eye(3), (reference.n_points, 3, 3))
     euclidean = anisotropic_quality(reference.points, reference.faces, identity)
     if (euclidean * reference.face_areas).sum() < _MIN_QUALITY * reference.area:
         creases = sharp_edges(reference, WEAK_ANGLE)
         reference = working_surface(reference, _EVEN_VERTICES, creases=creases, tagged=np.zeros_like(creases)).surface
-    roots = transfer_to_corners(ClosestPoints(reference), Curvature()(reference), surface)
+    return ClosestPoints(reference), Curvature()(reference)
+
+
+def quality_in_metric(closest: ClosestPoints, field: MetricField, surface: Surface) -> FaceScalars:
+    """Return the quality G (F,) of the triangles of a mesh in a metric on a surface that is near to it."""
+    roots = transfer_to_corners(closest, field, surface)
     return anisotropic_quality(surface.points, surface.faces, roots)
 
 

@@ -14,7 +14,7 @@ class StepInfo:
     ----------
     stage
         ``"load"``, ``"prepare"``, ``"metric"``, ``"embed"``, ``"cvt"``, ``"dual"``, ``"fit"``,
-        ``"attributes"`` or ``"search"``.
+        ``"attributes"``, ``"search"`` or ``"level"``.
     iteration, total
         Iterations done, and an upper bound on them; 0 where a stage has none.
     energy

@@ -5,7 +5,7 @@ from __future__ import annotations
 import os
 import secrets
 import shutil
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from pathlib import Path
 
@@ -31,6 +31,61 @@ def atomic_path(path: str | os.PathLike[str]) -> Iterator[Path]:
     The temporary path has the suffix of ``path``, since libraries choose the format by it. If the block raises,
     KeyboardInterrupt included, the temporary file is removed and ``path`` is unchanged.
     """
+    target, temporary = _places(path)
+    try:
+        yield temporary
+        _put(temporary, target)
+    except OSError as error:
+        raise MeshFileError(f"{path}: cannot be written: {error.strerror or error}") from error
+    finally:
+        temporary.unlink(missing_ok=True)
+
+
+@contextmanager
+def atomic_paths(paths: Sequence[str | os.PathLike[str]]) -> Iterator[list[Path]]:
+    """Yield temporary paths beside some paths and rename all to these when the block succeeds, or none.
+
+    Parameters
+    ----------
+    paths
+        The files to write, as for :func:`atomic_path`.
+
+    Raises
+    ------
+    MeshFileError
+        As for :func:`atomic_path`.
+
+    Notes
+    -----
+    If the block or a renaming raises, KeyboardInterrupt included, files that were there are there again and others are
+    not. A process that is killed between two renamings leaves files of both kinds, each of them whole.
+    """
+    pairs = [_places(path) for path in paths]
+    old = [target.with_name(f".{secrets.token_hex(4)}{target.suffix}") for target, _ in pairs]
+    begun, current = 0, paths[0]
+    try:
+        yield [temporary for _, temporary in pairs]
+        for (target, _), copy in zip(pairs, old, strict=True):
+            if target.exists():
+                _second_name(target, copy)
+        for begun, (target, temporary) in enumerate(pairs, 1):
+            current = paths[begun - 1]
+            _put(temporary, target)
+        begun = 0
+    except OSError as error:
+        raise MeshFileError(f"{current}: cannot be written: {error.strerror or error}") from error
+    finally:
+        for (target, temporary), copy in zip(pairs[:begun], old, strict=False):
+            if copy.exists():
+                copy.replace(target)
+            elif not temporary.exists():
+                target.unlink(missing_ok=True)
+        for path in (*(temporary for _, temporary in pairs), *old):
+            path.unlink(missing_ok=True)
+
+
+def _places(path: str | os.PathLike[str]) -> tuple[Path, Path]:
+    """Return a file without links and a temporary path beside it, or raise MeshFileError if it cannot be written."""
     try:
         target = Path(path).resolve()
         is_other = target.exists() and not target.is_file()
@@ -40,16 +95,22 @@ def atomic_path(path: str | os.PathLike[str]) -> Iterator[Path]:
         raise MeshFileError(f"{path}: cannot be written: the folder {target.parent} does not exist; create it first")
     if is_other:
         raise MeshFileError(f"{path}: cannot be written: it exists and is not a plain file; choose another name")
-    temporary = target.with_name(f".{target.stem[:80]}.{secrets.token_hex(4)}{target.suffix}")
+    return target, target.with_name(f".{target.stem[:80]}.{secrets.token_hex(4)}{target.suffix}")
+
+
+def _put(temporary: Path, target: Path) -> None:
+    """Put a complete temporary file in the place of another, with the mode of that."""
+    if target.exists():
+        shutil.copymode(target, temporary)
+    temporary.replace(target)
+
+
+def _second_name(file: Path, name: Path) -> None:
+    """Give a file a second name, or copy it where the file system has no links."""
     try:
-        yield temporary
-        if target.exists():
-            shutil.copymode(target, temporary)
-        temporary.replace(target)
-    except OSError as error:
-        raise MeshFileError(f"{path}: cannot be written: {error.strerror or error}") from error
-    finally:
-        temporary.unlink(missing_ok=True)
+        os.link(file, name)
+    except OSError:
+        shutil.copy2(file, name)
 
 
 def append_line(path: Path, line: str) -> None:

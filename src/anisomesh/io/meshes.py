@@ -205,20 +205,50 @@ def save(
     suffix = known_suffix(name, file_format)
     if point_data:
         mesh = _with_point_data(mesh, name, point_data)
-    folder = Path.cwd() if stream is not None else material_files.folder_of(name)
-    mesh = material_files.with_texture_names(mesh, lambda name: material_files.relative_name(name, folder))
     losses = Losses()
-    try:
-        content = WRITERS[suffix](mesh, losses)
-    except ValueError as error:
-        raise MeshFileError(f"{name}: cannot be written: {error}") from error
-    if suffix == ".obj":
-        content = material_files.write_beside(content, mesh, None if stream else Path(name), losses)
+    content = file_content(mesh, name, suffix, losses, in_file=stream is None)
     if stream is not None:
         stream.write(content)
     else:
         with atomic_path(name) as temporary:
             temporary.write_bytes(content)
+    warn_of_losses(name, suffix, losses)
+
+
+def file_content(mesh: Mesh, name: str, suffix: str, losses: Losses, *, in_file: bool = True) -> bytes:
+    """Return the content of a mesh file; the material file of an OBJ file is written beside it.
+
+    Parameters
+    ----------
+    mesh
+        The mesh.
+    name
+        The name of the file, or of a stream for messages.
+    suffix
+        The extension of the format.
+    losses
+        What is left out is added here.
+    in_file
+        Whether it is a file and not a stream.
+
+    Raises
+    ------
+    MeshFileError
+        If the format cannot hold the mesh.
+    """
+    folder = material_files.folder_of(name) if in_file else Path.cwd()
+    mesh = material_files.with_texture_names(mesh, lambda name: material_files.relative_name(name, folder))
+    try:
+        content = WRITERS[suffix](mesh, losses)
+    except ValueError as error:
+        raise MeshFileError(f"{name}: cannot be written: {error}") from error
+    if suffix == ".obj":
+        return material_files.write_beside(content, mesh, Path(name) if in_file else None, losses)
+    return content
+
+
+def warn_of_losses(name: str, suffix: str, losses: Losses) -> None:
+    """Log what was left out of a file, if anything was."""
     if losses.text():
         format_name = "MEDIT" if suffix in (".mesh", ".meshb") else suffix[1:].upper()
         logger.warning("%s: left out what %s cannot hold: %s", name, format_name, losses.text())

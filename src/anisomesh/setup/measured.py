@@ -56,8 +56,10 @@ class Measured:
         Which points of the surface are apexes, or fixed.
     field
         The metric on the working surface.
-    followed
-        What the tagged edges are, in words.
+    unlimited
+        The same before its stretch is limited on narrow patches, which depends on the number of vertices.
+    followed, followed_edges
+        What the tagged edges are, in words, and which edges of the prepared surface they are (E',).
     remarks
         What a user should know, one sentence each.
     """
@@ -70,7 +72,9 @@ class Measured:
     tips: PointMask
     working: Surface
     field: MetricField
+    unlimited: MetricField
     followed: str
+    followed_edges: EdgeMask
     remarks: tuple[str, ...]
 
 
@@ -141,7 +145,7 @@ def measure(source: PreparedInput, n: int, options: RemeshOptions, run: Run) -> 
             working = working.with_points(points)
             tagged = split.coarse_tagged
             surface = split.coarse.with_points(points[: split.coarse.n_points])
-        field = limit_to_patches(field, working, n)
+        limited = limit_to_patches(field, working, n)
     return Measured(
         options=options,
         frame=frame,
@@ -150,10 +154,25 @@ def measure(source: PreparedInput, n: int, options: RemeshOptions, run: Run) -> 
         split=split,
         tips=tips,
         working=working,
-        field=field,
+        field=limited,
+        unlimited=field,
         followed=followed.words,
+        followed_edges=followed.edges,
         remarks=followed.remarks,
     )
+
+
+def coarser(measured: Measured, source: PreparedInput, n: int) -> Measured | None:
+    """Return a measured surface for a smaller number of vertices; None if other lines are followed with so few.
+
+    The working surface stays: it resolves the sites of fewer vertices all the more.
+    """
+    surface = source.prepared.surface
+    followed = source.features_at(n, surface.with_points(measured.frame.to_unit(surface.points)))
+    if not np.array_equal(followed.edges, measured.followed_edges):
+        return None
+    limited = limit_to_patches(measured.unlimited, measured.working, n)
+    return replace(measured, field=limited, remarks=followed.remarks)
 
 
 def _with_smooth_borders(

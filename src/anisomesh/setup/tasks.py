@@ -5,8 +5,10 @@ from __future__ import annotations
 from dataclasses import dataclass, replace
 
 import numpy as np
+from scipy.spatial import cKDTree
 
-from anisomesh._arrays import CornerTensors, EdgeMask, PointMask, PointScalars, PointTensors
+from anisomesh._arrays import CornerTensors, EdgeMask, PointMask, PointScalars, PointTensors, Sites
+from anisomesh.cvt.coarsening import spread_subset
 from anisomesh.delaunay.meshing import MeshingTask
 from anisomesh.embedding.base import Embedding
 from anisomesh.embedding.density import area_factors, density_of_sizes
@@ -23,9 +25,9 @@ from anisomesh.metric.field import MetricField
 from anisomesh.metric.thin_walls import separate_thin_walls
 from anisomesh.metric.transfer import PlacedMetric
 from anisomesh.options import RemeshOptions
-from anisomesh.resolve import embedder, fit_plan, follows_creases, prescribes_sizes
+from anisomesh.resolve import cvt_options, embedder, fit_plan, follows_creases, is_designed, prescribes_sizes
 from anisomesh.setup.inputs import PreparedInput
-from anisomesh.setup.measured import Measured, measure
+from anisomesh.setup.measured import Measured, coarser, measure
 from anisomesh.voronoi.restricted import RestrictedVoronoi
 
 
@@ -41,39 +43,77 @@ class Tasks:
         The metric on the embedded surface, with what a density adds if sizes are prescribed.
     sizing
         The same with what a density adds in any case.
+    apart
+        The metric that is embedded, in which the faces of thin walls are apart.
     embedding
         The embedding of that surface.
     dual
         The task to make a mesh from sites.
     fit
         What that mesh is fitted to, None if it is not.
+    start
+        Positions (S, d) with which the optimisation of the sites begins, None for random ones.
     """
 
     measured: Measured
     metric: PlacedMetric
     sizing: PlacedMetric
+    apart: MetricField
     embedding: Embedding
     dual: MeshingTask
     fit: FitTarget | None
+    start: Sites | None = None
 
 
-def set_up(source: PreparedInput, n: int, options: RemeshOptions, run: Run, *, nearest: bool) -> Tasks:
+@dataclass(frozen=True, eq=False)
+class Finer:
+    """What a level of detail takes over from a finer one: what is known of the surface, and its sites (S, d)."""
+
+    tasks: Tasks
+    sites: Sites
+
+
+def set_up(
+    source: PreparedInput,
+    n: int,
+    options: RemeshOptions,
+    run: Run,
+    *,
+    nearest: bool = False,
+    finer: Finer | None = None,
+) -> Tasks:
     """Return the tasks to remesh a prepared surface with n vertices.
 
-    ``nearest`` if the distance counts more than the shape.
+    Parameters
+    ----------
+    source, n, options, run
+        The surface, how many vertices, and how.
+    nearest
+        Whether the distance counts more than the shape.
+    finer
+        A mesh of the same surface with more vertices, whose working surface and metric are taken, and its embedding
+        where it does not depend on the number of vertices. None to compute all.
     """
-    measured = measure(source, n, options, run)
+    measured = None if finer is None else coarser(finer.tasks.measured, source, n)
+    finer = None if measured is None else finer
+    measured = measure(source, n, options, run) if measured is None else measured
     options, surface, split = measured.options, measured.surface, measured.split
     working, field = measured.working, measured.field
     with run.stage("embed"):
         apart = separate_thin_walls(field, working, n, options.feature_angle) if follows_creases(options) else field
-        embedding = checked_embedding(embedder(options)(working, apart), working)
+        if finer is not None and apart is finer.tasks.apart:
+            embedding = finer.tasks.embedding
+        else:
+            embedding = checked_embedding(embedder(options)(working, apart), working)
         density = None if source.density is None else split.interpolate(source.density)
         asked, weights = _with_density(field, density, working), None
         if prescribes_sizes(options) and not nearest:
             density = density_of_sizes(working, _given(_with_density(apart, density, working)), embedding.points)
             weights = area_factors(working, _given(asked)) ** 2
-        embedded = EmbeddedSurface(working, embedding.points, embedding.scale, density)
+        if finer is not None and embedding is finer.tasks.embedding:
+            embedded = finer.tasks.dual.voronoi.embedded
+        else:
+            embedded = EmbeddedSurface(working, embedding.points, embedding.scale, density)
         task = MeshingTask(
             voronoi=RestrictedVoronoi(embedded, threads=options.threads),
             features=_features(embedded, n, split.tagged, measured.tips, options),
@@ -84,6 +124,7 @@ def set_up(source: PreparedInput, n: int, options: RemeshOptions, run: Run, *, n
             error_weights=weights,
             anchors=source.anchors(n, measured.frame),
         )
+        start = None if finer is None else _start(finer, task, options)
         plan = fit_plan(options, surface, nearest=nearest)
         if plan is not None and source.junctions is not None:  # a decimation of sheets would not fit together
             plan = replace(plan, decimation=None)
@@ -93,7 +134,32 @@ def set_up(source: PreparedInput, n: int, options: RemeshOptions, run: Run, *, n
         target = None
         if plan is not None:
             target = _fit_target(task, measured.tagged, metric, plan, options, prescribed=prescribed)
-    return Tasks(measured=measured, metric=metric, sizing=sizing, embedding=embedding, dual=task, fit=target)
+    return Tasks(
+        measured=measured,
+        metric=metric,
+        sizing=sizing,
+        apart=apart,
+        embedding=embedding,
+        dual=task,
+        fit=target,
+        start=start,
+    )
+
+
+def _start(finer: Finer, task: MeshingTask, options: RemeshOptions) -> Sites | None:
+    """Return as many sites (n, d) of a finer mesh as a task takes, in its embedding; None if there are too few.
+
+    On measured surfaces they are denser where so many sites have more energy. On designed ones that says too little:
+    cells across a crease have nearly all of the energy until their sites are on it.
+    """
+    sites, own, embedded = finer.sites, finer.tasks.dual.voronoi.embedded, task.voronoi.embedded
+    if len(sites) <= task.n_vertices:
+        return None
+    if embedded is not own:
+        sites = embedded.points[cKDTree(own.points).query(sites)[1]]
+    energy = cvt_options(options, sized=prescribes_sizes(options)).resampling_energy
+    energy = None if is_designed(task.surface) else energy
+    return spread_subset(RestrictedVoronoi(embedded, threads=options.threads), sites, task.n_vertices, energy)
 
 
 def _with_density(field: MetricField, density: PointScalars | None, surface: Surface) -> MetricField:

@@ -6,11 +6,12 @@ import typer
 
 from anisomesh.cli.figures import many, result
 from anisomesh.cli.log import logs
+from anisomesh.cli.ratios import RatiosCommand
 
 app = typer.Typer(add_completion=False)
 app.command("result")(logs(result.command))
 app.command("gallery")(logs(many.gallery))
-app.command("strip", cls=many.StripCommand)(logs(many.strip))
+app.command("strip", cls=RatiosCommand)(logs(many.strip))
 
 
 @app.callback(invoke_without_command=True)

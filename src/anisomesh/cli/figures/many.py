@@ -6,9 +6,8 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
-from typer.core import TyperCommand
 
-from anisomesh.cli.arguments import COMMON_REMESH_OPTIONS, Quiet, Source, share, takes_remesh_options
+from anisomesh.cli.arguments import COMMON_REMESH_OPTIONS, Quiet, Source, takes_remesh_options
 from anisomesh.cli.figures.options import (
     Direction,
     Out,
@@ -21,6 +20,7 @@ from anisomesh.cli.figures.options import (
 )
 from anisomesh.cli.job import read, run_remesh
 from anisomesh.cli.progress import progress
+from anisomesh.cli.ratios import shares
 from anisomesh.cli.report import counted
 from anisomesh.cli.spelling import warning_rows
 
@@ -59,22 +59,6 @@ def gallery(
     conclude([(panel.name, size(panel.surface)) for panel in panels], out, quiet)
 
 
-class StripCommand(TyperCommand):
-    """A command with an option ``--ratios`` that takes all numbers after it."""
-
-    def parse_args(self, ctx: Any, args: list[str]) -> list[str]:
-        """Join the numbers after ``--ratios`` to one word, then parse as usual."""
-        words = list(args)
-        if "--ratios" in words:
-            first = words.index("--ratios") + 1
-            last = first
-            while last < len(words) and _is_number(words[last]):
-                last += 1
-            if last > first:
-                words[first:last] = [" ".join(words[first:last])]
-        return super().parse_args(ctx, words)
-
-
 @takes_remesh_options(*COMMON_REMESH_OPTIONS)
 def strip(
     source: Source,
@@ -92,7 +76,7 @@ def strip(
     from anisomesh.viz import Panel
     from anisomesh.viz import gallery as draw
 
-    wanted = _parsed(ratios)
+    wanted = shares(ratios)
     view = picture_options(direction, up, scale)
     check_figure_path(out, source)
     panels, rows = [], []
@@ -111,22 +95,3 @@ def strip(
 
 def _vertices(surface: Surface) -> str:
     return counted(surface.n_points, "vertex", "vertices")
-
-
-def _is_number(word: str) -> bool:
-    try:
-        float(word.removesuffix("%"))
-    except ValueError:
-        return False
-    return True
-
-
-def _parsed(ratios: str) -> list[float]:
-    """Return the shares in a text, separated by spaces or commas."""
-    words = ratios.replace(",", " ").split()
-    if not words:
-        raise typer.BadParameter("--ratios: expected at least one number")
-    try:
-        return [share(word) for word in words]
-    except typer.BadParameter as error:
-        raise typer.BadParameter(f"--ratios: {error}") from None

@@ -13,15 +13,15 @@ from anisomesh.cli.arguments import (
     REMESH_OPTIONS,
     Length,
     Quiet,
-    Ratio,
     Source,
-    Vertices,
     positive,
+    share,
     takes_remesh_options,
     target_option,
 )
 from anisomesh.cli.job import STANDARD_STREAM, Outputs, check_input_format, default_output, read_mesh, run_remesh
 from anisomesh.cli.progress import progress
+from anisomesh.cli.remeshing.levels import LevelOutputs, levels_summary, run_levels, targets_of
 from anisomesh.cli.remeshing.prescribed_metric import MetricFile, check_limits, file_of, prescribed_metric
 from anisomesh.cli.report import as_json, hints, summary
 
@@ -36,8 +36,26 @@ _input = partial(typer.Option, rich_help_panel="Input")
 def command(
     context: typer.Context,
     source: Source,
-    n_vertices: Vertices = None,
-    ratio: Ratio = None,
+    n_vertices: Annotated[
+        list[int] | None,
+        target_option(
+            "--vertices", "-n", min=4, metavar="N", help="Number of vertices, at least 4; several for levels of detail."
+        ),
+    ] = None,
+    ratio: Annotated[
+        list[float] | None,
+        target_option(
+            "--ratio", parser=share, metavar="SHARE", help="Vertices as a share of the input's, such as 0.2 or 20%."
+        ),
+    ] = None,
+    ratios: Annotated[
+        str | None,
+        target_option(
+            "--ratios",
+            metavar="R [R ...]",
+            help="Levels of detail, such as 1 0.5 0.2 0.05: each made from the next finer.",
+        ),
+    ] = None,
     max_error: Annotated[
         str | None,
         target_option(
@@ -59,7 +77,8 @@ def command(
             "--out",
             "-o",
             metavar="OUT",
-            help="Mesh to write; the suffix is the format. By default part_remeshed.ply for part.ply; may be IN.",
+            help="Mesh to write; the suffix is the format. By default part_remeshed.ply for part.ply; may be IN. "
+            "Levels of detail are out.lod0.ply, out.lod1.ply, ... for out.ply, and one file for out.glb.",
         ),
     ] = None,
     input_format: Annotated[
@@ -158,15 +177,16 @@ def command(
     quiet: Quiet = False,
     **options: Any,
 ) -> None:
-    """Remesh IN with anisotropic triangles. Give -n, --ratio, --max-error, --edge-length or --metric-file.
+    """Remesh IN with anisotropic triangles. Give -n, --ratio, --ratios, --max-error, --edge-length or --metric-file.
 
     IN may be -, which is standard input.
     """
-    targets = 4 - (n_vertices, ratio, max_error, edge_length).count(None)
+    targets = 5 - (n_vertices or None, ratio or None, ratios, max_error, edge_length).count(None)
     if targets > 1 or (targets == 0 and metric_file is None):
         raise typer.BadParameter(
-            "give one of -n (number of vertices), --ratio, --max-error and --edge-length, or --metric-file"
+            "give one of -n (number of vertices), --ratio, --ratios, --max-error and --edge-length, or --metric-file"
         )
+    target, n_levels = targets_of(n_vertices, ratio, ratios)
     prescribed = prescribed_metric(context, metric_file, adapt_to, norm, edge_length=edge_length, max_error=max_error)
     limits = {"--min-size": min_size, "--max-size": max_size, "--gradation": gradation}
     check_limits(prescribed, [option for option, value in limits.items() if value is not None])
@@ -180,8 +200,17 @@ def command(
     lengths = {
         name: Length.parse(text, f"--{name.replace('_', '-')}") for name, text in texts.items() if text is not None
     }
-    out = default_output(source, input_format, output_format) if out is None else out
-    outputs = Outputs(mesh=out, mesh_format=output_format, report=report, rvd=rvd, metric=save_metric, picture=picture)
+    files_of = partial(LevelOutputs, levels=n_levels) if n_levels else Outputs
+    outputs = files_of(
+        mesh=default_output(source, input_format, output_format) if out is None else out,
+        mesh_format=output_format,
+        report=report,
+        rvd=rvd,
+        metric=save_metric,
+        picture=picture,
+    )
+    if out is None:
+        outputs.check_new()
     to_stdout = out == STANDARD_STREAM
     if to_stdout and json_:
         raise typer.BadParameter("-o - and --json both write to standard output; use --report FILE")
@@ -199,7 +228,7 @@ def command(
     with progress(quiet) as display:
         mesh, seconds = read_mesh(source, input_format)
         _check_tables(mesh.surface, options, features, density)
-        options |= {"n_vertices": n_vertices, "ratio": ratio, "gradation": gradation}
+        options |= {**target, "gradation": gradation}
         options |= {name: length.on(mesh.surface) for name, length in lengths.items()}
         if weld is not None:
             options["weld_tolerance"] = options.pop("weld", weld)
@@ -207,8 +236,10 @@ def command(
             display.note(prescribed.description)
             options |= prescribed.options_for(mesh, str(source))
         with prescribed.named_in_errors() if isinstance(prescribed, MetricFile) else nullcontext():
-            result, facts = run_remesh(mesh, display, name=str(source), load_seconds=seconds, **options)
-        facts["hints"] = hints(result.prepared)
+            run: Any = run_levels if n_levels else run_remesh
+            result, facts = run(mesh, display, name=str(source), load_seconds=seconds, **options)
+        first = result[0] if n_levels else result
+        facts["hints"] = hints(first.prepared)
         facts["options"] |= {name: None if path is None else str(path) for name, path in files.items()}
         if prescribed is not None:
             facts["options"] |= prescribed.facts
@@ -216,7 +247,8 @@ def command(
     if json_:
         typer.echo(as_json(facts))
     elif not quiet:
-        typer.echo(summary(facts, outputs.paths, result.prepare_report.lines()), err=to_stdout)
+        text = levels_summary if n_levels else summary
+        typer.echo(text(facts, outputs.paths, first.prepare_report.lines()), err=to_stdout)
 
 
 def _check_tables(surface: Surface, options: dict[str, Any], features: Path | None, density: Path | None) -> None:

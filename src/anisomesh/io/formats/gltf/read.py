@@ -24,6 +24,9 @@ NODE, MATERIAL = "node", "material"
 NO_MATERIAL = -1
 """Label of faces without a material."""
 
+LEVELS = "MSFT_lod"
+"""The extension by which a node names the nodes with its coarser levels of detail."""
+
 TRIANGLES, _STRIP, _FAN = 4, 5, 6  # modes of a primitive; lower ones are points and lines
 _COPIES = "EXT_mesh_gpu_instancing"
 _DEEPEST = 200  # of nodes in nodes
@@ -52,6 +55,7 @@ class _Scene:
         self._points: list[npt.NDArray[np.float64]] = [np.zeros((0, 3))]
         self._n_points = 0
         self._n_instances = 0
+        self._coarser = _coarser_levels(self._json)
         self._carried = Carried()
         self._attributes = Attributes()
         self._known: dict[Any, int] = {}  # first point of vertices that several primitives share
@@ -65,12 +69,21 @@ class _Scene:
             for node in scenes[self._json.get("scene", 0)].get("nodes", []):
                 self._add_node(node, np.eye(4), 0)
         else:
+            coarser = {self._json["nodes"][node].get("mesh") for node in self._coarser}
             for mesh in range(len(self._json.get("meshes", []))):
-                self._add_mesh(mesh, np.eye(4), mesh)
-        used = _COPIES in self._json.get("extensionsUsed", [])
-        remarks = (f"left out copies of its meshes that {_COPIES} makes",) if used else ()
+                if mesh not in coarser:
+                    self._add_mesh(mesh, np.eye(4), mesh)
         self._carry()
-        return self._cells.soup(np.concatenate(self._points), remarks, self._carried)
+        return self._cells.soup(np.concatenate(self._points), self._left_out(), self._carried)
+
+    def _left_out(self) -> tuple[str, ...]:
+        """Return what of the geometry is left out, a line each."""
+        remarks = []
+        if _COPIES in self._json.get("extensionsUsed", []):
+            remarks.append(f"left out copies of its meshes that {_COPIES} makes")
+        if self._coarser:
+            remarks.append(f"read its finest level of detail; coarser ones left out ({LEVELS}): {len(self._coarser)}")
+        return tuple(remarks)
 
     def _carry(self) -> None:
         """Collect everything besides triangles."""
@@ -110,6 +123,8 @@ class _Scene:
         self._n_instances += 1
         if depth > _DEEPEST or self._n_instances > _MAX_INSTANCES:
             raise ValueError("malformed: its nodes contain each other")
+        if index in self._coarser:
+            return
         node = self._json["nodes"][index_of(index)]
         matrix = above @ _matrix(node)
         if "mesh" in node:
@@ -151,6 +166,12 @@ class _Scene:
             found = read_attributes(self._document, primitive["attributes"], matrix, self._carried)
             self._attributes.add(len(points), found)
         return self._known[key]
+
+
+def _coarser_levels(document: dict[str, Any]) -> set[int]:
+    """Return the numbers of the nodes that are coarser levels of detail of others."""
+    extensions = [node.get("extensions", {}) for node in document.get("nodes", [])]
+    return {index_of(node) for each in extensions if LEVELS in each for node in each[LEVELS]["ids"]}
 
 
 def _matrix(node: dict[str, Any]) -> npt.NDArray[np.float64]:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -13,11 +13,12 @@ from anisomesh.io.carried import Integers
 from anisomesh.io.formats.gltf.attributes import Encoded, encoded
 from anisomesh.io.formats.gltf.document import BINARY_CHUNK, COMPONENTS, JSON_CHUNK, WIDTHS
 from anisomesh.io.formats.gltf.materials import write_materials
-from anisomesh.io.formats.gltf.read import MATERIAL, NO_MATERIAL, NODE, TRIANGLES
+from anisomesh.io.formats.gltf.read import LEVELS, MATERIAL, NO_MATERIAL, NODE, TRIANGLES
 from anisomesh.io.formats.region_names import region_texts
 from anisomesh.io.holding import Losses, by_label, distinct_corners, main_division
 from anisomesh.io.objects.trimesh_scenes import TRIMESH, materials_as_gltf
 
+_COVERAGE = "MSFT_screencoverage"  # least share of the screen for each level
 _ALIGNMENT = 4  # bytes
 _ELEMENT_ARRAY, _ARRAY = 34963, 34962  # targets of views
 _TYPE_OF = {kind: code for code, kind in COMPONENTS.items()}
@@ -47,21 +48,51 @@ def glb_bytes(mesh: Mesh, losses: Losses) -> bytes:
     A division becomes nodes, the one called ``material`` becomes primitives with materials. Points are repeated where
     corner data differ, and between primitives. Regions keep their names, not their numbers.
     """
+    writer = _Writer()
+    writer.document["scenes"][0]["nodes"] = _add_mesh(mesh, writer, losses)
+    writer.add_materials(_given_materials(mesh))
+    return writer.content()
+
+
+def glb_levels_bytes(meshes: Sequence[Mesh], losses: Losses) -> bytes:
+    """Return the content of a binary glTF file with levels of detail, the finest first.
+
+    Notes
+    -----
+    The finest is the only node of the scene, and names the nodes of the others, which are in no scene. Programs that do
+    not know the extension show the finest. A level is meant for the screen coverage at which its vertices are as dense
+    on the screen as the ones of the finest that fills it; the coarsest for any smaller one.
+
+    References
+    ----------
+    Extension MSFT_lod: https://github.com/KhronosGroup/glTF/tree/main/extensions/2.0/Vendor/MSFT_lod.
+    """
+    writer, heads = _Writer(), []
+    for mesh in meshes:
+        nodes = _add_mesh(mesh, writer, losses if mesh is meshes[0] else Losses())
+        heads.append(nodes[0] if len(nodes) == 1 else writer.add_group(nodes))
+    writer.document["scenes"][0]["nodes"] = heads[:1]
+    writer.add_materials(_given_materials(meshes[0]))
+    if len(meshes) > 1:
+        finest, counts = writer.document["nodes"][heads[0]], [mesh.surface.n_points for mesh in meshes]
+        finest["extensions"] = {LEVELS: {"ids": heads[1:]}}
+        finest["extras"] = {_COVERAGE: [*(count / counts[0] for count in counts[1:]), 0.0]}
+        writer.document["extensionsUsed"] = [*writer.document.get("extensionsUsed", []), LEVELS]
+    return writer.content()
+
+
+def _add_mesh(mesh: Mesh, writer: _Writer, losses: Losses) -> list[int]:
+    """Add a mesh and return the numbers of its nodes."""
     if float(np.abs(mesh.surface.points).max()) > float(np.finfo(np.float32).max):
         raise ValueError("coordinates beyond 3.4e38 do not fit the float32 of GLB; use PLY instead")
     nodes, materials = _divisions(mesh, losses)
     losses.add("face data", *mesh.face_data)
-    theirs = mesh.materials.get(TRIMESH)
-    held = ("gltf", TRIMESH) if isinstance(theirs, Mapping) else ("gltf",)
+    held = ("gltf", TRIMESH) if isinstance(mesh.materials.get(TRIMESH), Mapping) else ("gltf",)
     losses.add("materials", *(name for name in mesh.materials if name not in held))
     losses.features(mesh)
-    writer, attributes = _Writer(), _attributes(mesh, losses)
-    given = mesh.materials.get("gltf")
-    if given is None and isinstance(theirs, Mapping):
-        given = materials_as_gltf(theirs)
-    given = given if isinstance(given, dict) else {}
+    attributes = _attributes(mesh, losses)
     labels = [np.zeros(mesh.surface.n_faces, dtype=np.int64) if d is None else d.labels for d in (nodes, materials)]
-    numbers, names = _material_numbers(materials, given, losses)
+    numbers = _material_numbers(materials, _given_materials(mesh), writer, losses)
     primitives: dict[int, list[dict[str, Any]]] = {}
     for (node, material), chosen in by_label(*labels):
         primitive = _primitive(mesh, np.sort(chosen), writer, attributes)
@@ -69,13 +100,15 @@ def glb_bytes(mesh: Mesh, losses: Losses) -> bytes:
             primitive["material"] = numbers[material]
         primitives.setdefault(node, []).append(primitive)
     texts = {} if nodes is None else region_texts(nodes, losses)
-    for node, parts in primitives.items():
-        writer.add_node(parts, texts.get(node, ""))
-    if given:
-        write_materials(given, writer.document, writer.binary)
-    elif names:
-        writer.document["materials"] = [{"name": name} for name in names]
-    return writer.content()
+    return [writer.add_node(parts, texts.get(node, "")) for node, parts in primitives.items()]
+
+
+def _given_materials(mesh: Mesh) -> dict[str, Any]:
+    """Return the materials of a mesh as glTF has them, empty if it has none."""
+    given, theirs = mesh.materials.get("gltf"), mesh.materials.get(TRIMESH)
+    if given is None and isinstance(theirs, Mapping):
+        given = materials_as_gltf(theirs)
+    return given if isinstance(given, dict) else {}
 
 
 def _divisions(mesh: Mesh, losses: Losses) -> tuple[Regions | None, Regions | None]:
@@ -87,14 +120,14 @@ def _divisions(mesh: Mesh, losses: Losses) -> tuple[Regions | None, Regions | No
 
 
 def _material_numbers(
-    materials: Regions | None, given: dict[str, Any], losses: Losses
-) -> tuple[dict[int, int], list[str]]:
-    """Return the number of the material of each label, and the names of new materials; -1 without a name is none.
+    materials: Regions | None, given: dict[str, Any], writer: _Writer, losses: Losses
+) -> dict[int, int]:
+    """Return the number of the material of each label, of which new ones are named; -1 without a name is none.
 
     With ``given`` materials the labels are their numbers.
     """
     if materials is None:
-        return {}, []
+        return {}
     labels = np.unique(materials.labels).tolist()
     if len(labels) > 1 and NO_MATERIAL not in materials.names:
         labels = [label for label in labels if label != NO_MATERIAL]
@@ -102,9 +135,9 @@ def _material_numbers(
         numbers = {label: label for label in labels if 0 <= label < len(given.get("materials", []))}
         if len(numbers) < len(labels):
             losses.add("regions", MATERIAL)
-        return numbers, []
+        return numbers
     texts = region_texts(materials, losses)
-    return {label: k for k, label in enumerate(labels)}, [texts[label] for label in labels]
+    return {label: writer.named_material(label, texts[label]) for label in labels}
 
 
 def _primitive(mesh: Mesh, chosen: Integers, writer: _Writer, attributes: list[_Attribute]) -> dict[str, Any]:
@@ -156,14 +189,31 @@ class _Writer:
             "accessors": [],
         }
         self.binary: list[bytes] = []
+        self._named: dict[tuple[int, str], int] = {}
         self._views: dict[int, dict[str, int]] = {}
 
-    def add_node(self, primitives: list[dict[str, Any]], name: str) -> None:
-        """Add a node with a mesh."""
-        number = len(self.document["nodes"])
-        self.document["scenes"][0]["nodes"].append(number)
-        self.document["nodes"].append({"mesh": number, **({"name": name} if name else {})})
+    def add_node(self, primitives: list[dict[str, Any]], name: str) -> int:
+        """Add a node with a mesh and return its number."""
+        node = {"mesh": len(self.document["meshes"]), **({"name": name} if name else {})}
+        self.document["nodes"].append(node)
         self.document["meshes"].append({"primitives": primitives, **({"name": name} if name else {})})
+        return len(self.document["nodes"]) - 1
+
+    def add_group(self, nodes: list[int]) -> int:
+        """Add a node with other nodes in it and return its number."""
+        self.document["nodes"].append({"children": nodes})
+        return len(self.document["nodes"]) - 1
+
+    def named_material(self, label: int, name: str) -> int:
+        """Return the number of a new material with a label and a name; the same for the same ones."""
+        return self._named.setdefault((label, name), len(self._named))
+
+    def add_materials(self, given: dict[str, Any]) -> None:
+        """Add given materials, or the new ones if there are none."""
+        if given:
+            write_materials(given, self.document, self.binary)
+        elif self._named:
+            self.document["materials"] = [{"name": name} for _, name in self._named]
 
     def add_rows(self, part: Encoded, target: int = _ARRAY) -> int:
         """Add an array (n, k) and return the number of its accessor."""

@@ -1,0 +1,1 @@
+"""Levels of detail: one mesh with several numbers of vertices."""
