@@ -20,6 +20,7 @@ _STAGE_LABELS = {
     "fit": "fitting them to the input",
     "attributes": "carrying attributes over",
     "search": "searching the number of vertices",
+    "batch": "remeshing",
 }
 _SECONDS_BETWEEN_LINES = 5.0  # heuristic
 

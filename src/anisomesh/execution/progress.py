@@ -14,7 +14,7 @@ class StepInfo:
     ----------
     stage
         ``"load"``, ``"prepare"``, ``"metric"``, ``"embed"``, ``"cvt"``, ``"dual"``, ``"fit"``,
-        ``"attributes"`` or ``"search"``.
+        ``"attributes"`` or ``"search"``; ``"batch"`` for a job of many.
     iteration, total
         Iterations done, and an upper bound on them; 0 where a stage has none.
     energy

@@ -11,11 +11,11 @@ import typer
 
 from anisomesh.cli.arguments import (
     REMESH_OPTIONS,
-    Length,
     Quiet,
     Ratio,
     Source,
     Vertices,
+    length,
     positive,
     takes_remesh_options,
     target_option,
@@ -177,9 +177,7 @@ def command(
         "max_size": max_size,
         "weld": None if weld == "auto" else weld,
     }
-    lengths = {
-        name: Length.parse(text, f"--{name.replace('_', '-')}") for name, text in texts.items() if text is not None
-    }
+    lengths = {name: length(text, f"--{name.replace('_', '-')}") for name, text in texts.items() if text is not None}
     out = default_output(source, input_format, output_format) if out is None else out
     outputs = Outputs(mesh=out, mesh_format=output_format, report=report, rvd=rvd, metric=save_metric, picture=picture)
     to_stdout = out == STANDARD_STREAM
@@ -200,7 +198,7 @@ def command(
         mesh, seconds = read_mesh(source, input_format)
         _check_tables(mesh.surface, options, features, density)
         options |= {"n_vertices": n_vertices, "ratio": ratio, "gradation": gradation}
-        options |= {name: length.on(mesh.surface) for name, length in lengths.items()}
+        options |= {name: given.on(mesh.surface.diagonal) for name, given in lengths.items()}
         if weld is not None:
             options["weld_tolerance"] = options.pop("weld", weld)
         if prescribed is not None:
