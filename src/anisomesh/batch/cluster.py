@@ -29,6 +29,7 @@ _LOCAL_CONFIG = {
     "distributed.worker.memory.spill": False,
     "distributed.worker.memory.pause": False,  # a paused worker would keep its task forever
     "distributed.worker.memory.terminate": 0.95,
+    "distributed.worker.preload": ["anisomesh.batch.worker"],
     "distributed.comm.timeouts.connect": _SECONDS_TO_CONNECT,
 }
 

@@ -141,6 +141,8 @@ class Batch:
         for count, outcome in enumerate(outcomes, 1):
             job = self.left[outcome.number]
             self._rows[job.output] = row = self.results.append(_row(job, outcome))
+            if count == 1:  # what came before was the start of the workers
+                start = time.monotonic() - (row["seconds"] or 0.0)
             seconds_left = (time.monotonic() - start) / count * (len(tasks) - count)
             on_row(Progress(row, count, len(tasks), seconds_left))
         if tasks or not (self.folder / PAGE).exists():
