@@ -17,12 +17,12 @@ from pathlib import Path
 
 import numpy as np
 
-from anisomesh.batch.engine import Work, Workers
+from anisomesh.batch.engine import Work, WorkerPool
 from anisomesh.batch.inputs import jobs_of
 from anisomesh.batch.jobs import Job
 from anisomesh.batch.keys import facts_of_files, key_of
 from anisomesh.batch.running import REMESHING, Batch, Settings
-from anisomesh.batch.work import Task, do
+from anisomesh.batch.work import BatchTask, do
 from anisomesh.io.meshes import save
 from anisomesh.shapes.analytic import sphere
 
@@ -31,14 +31,14 @@ WORDS = ["-n", "20", "--max-iterations", "1", "--embedding", "direct", "--no-fit
 KILLED_EVERY, N_WITH_KILLS = 10, 40
 
 
-def do_or_die(task: Task, attempt: int) -> dict:
+def do_or_die(task: BatchTask, attempt: int) -> dict:
     """Remesh, but kill the worker of every tenth job in its first try."""
     if int(Path(task.job.input).stem) % KILLED_EVERY == KILLED_EVERY - 1 and attempt == 1:
         os.kill(os.getpid(), signal.SIGKILL)
     return do(task, attempt)
 
 
-def copy(task: Task, attempt: int) -> dict:
+def copy(task: BatchTask, attempt: int) -> dict:
     """Copy the input to the output, all that a job is without its remesh."""
     files = facts_of_files(task.job)
     Path(task.target).write_bytes(Path(task.job.input).read_bytes())
@@ -48,7 +48,7 @@ def copy(task: Task, attempt: int) -> dict:
 def measure_overhead(jobs: list[Job], folder: Path) -> None:
     """Print how long jobs take that only copy a file, and a batch of them that is done."""
     ends: list[float] = []
-    batch = Batch(jobs, folder / "copies", Settings(workers=Workers(count=2)))
+    batch = Batch(jobs, folder / "copies", Settings(workers=WorkerPool(count=2)))
     before = sum(os.times()[:4])
     batch.run(lambda step: ends.append(time.monotonic()), work=Work(do=copy))
     used = sum(os.times()[:4]) - before
@@ -67,7 +67,7 @@ def measure(jobs: list[Job], out: Path, n_workers: int) -> None:
     """Print the throughput of a batch, without the start of the workers, and the overhead of its jobs."""
     ends: list[float] = []
     begin = time.monotonic()
-    batch = Batch(jobs, out, Settings(workers=Workers(count=n_workers)))
+    batch = Batch(jobs, out, Settings(workers=WorkerPool(count=n_workers)))
     rows = batch.run(lambda step: ends.append(time.monotonic()))
     span, n = ends[-1] - ends[0], len(ends) - 1
     seconds = np.array([row["seconds"] for row in rows])
@@ -97,7 +97,7 @@ def main() -> None:
         for n_workers in arguments.workers:
             measure(jobs, folder / f"out{n_workers}", n_workers)
         some = sorted(jobs, key=lambda job: int(Path(job.input).stem))[:N_WITH_KILLS]
-        batch = Batch(some, folder / "killed", Settings(workers=Workers(count=2)))
+        batch = Batch(some, folder / "killed", Settings(workers=WorkerPool(count=2)))
         rows = batch.run(work=replace(REMESHING, do=do_or_die))
         tried = sum(row["tries"] > 1 for row in rows)
         print(f"{sum(row['status'] == 'done' for row in rows)} of {len(rows)} jobs done, {tried} of them begun again")

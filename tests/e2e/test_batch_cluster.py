@@ -11,7 +11,7 @@ from pathlib import Path
 
 import pytest
 
-from anisomesh.batch.engine import MAX_TRIES, Work, Workers
+from anisomesh.batch.engine import MAX_TRIES, Work, WorkerPool
 from anisomesh.batch.jobs import Job
 from anisomesh.batch.rows import Results
 from anisomesh.batch.running import Batch, Settings
@@ -40,7 +40,7 @@ def limit(task):
 def test_a_worker_that_ends_costs_its_task_a_try_and_nothing_else():
     kinds = [("kill", 1), ("kill", MAX_TRIES), ("hang", 1), ("raise", 0), *[("plain", 0)] * 8]
     tasks = [{"kind": kind, "times": times, "limit": 2.0 if kind == "hang" else None} for kind, times in kinds]
-    found = sorted(Workers(count=2).run(Work(do=act, limit=limit), tasks), key=lambda outcome: outcome.number)
+    found = sorted(WorkerPool(count=2).run(Work(do=act, limit=limit), tasks), key=lambda outcome: outcome.number)
     assert [outcome.number for outcome in found] == list(range(len(tasks)))
     assert [outcome.tries for outcome in found] == [2, MAX_TRIES, 2, *[1] * 9]
     failed = [outcome.error for outcome in found if outcome.error is not None]
@@ -67,7 +67,7 @@ def jobs_in(folder, n):
 
 def test_every_job_is_done_if_a_worker_is_killed_every_ten(tmp_path):
     jobs = jobs_in(tmp_path, 40)
-    rows = Batch(jobs, tmp_path / "out", Settings(workers=Workers(count=2))).run(work=Work(do=kill_every_tenth))
+    rows = Batch(jobs, tmp_path / "out", Settings(workers=WorkerPool(count=2))).run(work=Work(do=kill_every_tenth))
     assert [row["status"] for row in rows] == 40 * ["done"]
     assert [row["tries"] for row in rows] == 4 * (9 * [1] + [2])
     assert all((tmp_path / "out" / f"{k}.ply").is_file() for k in range(40))
@@ -79,22 +79,22 @@ def test_a_running_cluster_is_used_and_left_running(monkeypatch):
     from distributed import LocalCluster
 
     with LocalCluster(n_workers=1, threads_per_worker=1, dashboard_address=None) as cluster:
-        workers, work = Workers(scheduler=cluster.scheduler_address), Work(do=act)
+        workers, work = WorkerPool(scheduler=cluster.scheduler_address), Work(do=act)
         tasks = [{"kind": "plain", "times": 0}, {"kind": "kill", "times": 1}, {"kind": "plain", "times": 0}]
         assert sorted((o.number, o.tries) for o in workers.run(work, tasks)) == [(0, 1), (1, 2), (2, 1)]
         assert len({outcome.result for outcome in workers.run(work, tasks[:1])}) == 1
     monkeypatch.setattr("anisomesh.batch.cluster._SECONDS_TO_CONNECT", 0.5)
     with pytest.raises(AnisomeshError, match="no scheduler answers"):
-        list(Workers(scheduler="tcp://127.0.0.1:9").run(work, tasks))
+        list(WorkerPool(scheduler="tcp://127.0.0.1:9").run(work, tasks))
 
 
 SCRIPT = """
 import os, sys, time
 from pathlib import Path
-from anisomesh.batch.engine import Work, Workers
+from anisomesh.batch.engine import Work, WorkerPool
 from test_batch_cluster import note_and_wait
 if __name__ == "__main__":
-    list(Workers(count=1).run(Work(do=note_and_wait), [sys.argv[1]]))
+    list(WorkerPool(count=1).run(Work(do=note_and_wait), [sys.argv[1]]))
 """
 
 

@@ -8,7 +8,7 @@ from pathlib import Path
 
 import pytest
 
-from anisomesh.batch import Job, Settings, Workers, run
+from anisomesh.batch import Job, Settings, WorkerPool, run
 from anisomesh.batch.engine import Outcome, Work, has_dask
 from anisomesh.batch.inputs import jobs_of
 from anisomesh.batch.jobs import checked
@@ -17,12 +17,12 @@ from anisomesh.batch.manifest import read_manifest
 from anisomesh.batch.options import OPTION_NAMES, for_mesh, plain_options
 from anisomesh.batch.rows import Results
 from anisomesh.batch.running import Batch
-from anisomesh.batch.work import Task, do
+from anisomesh.batch.work import BatchTask, do
 from anisomesh.errors import AnisomeshError, OptionError
 from anisomesh.io.meshes import load
 from conftest import torus_arrays, write_obj
 
-HERE = Settings(workers=Workers(count=0))
+HERE = Settings(workers=WorkerPool(count=0))
 TARGET = {"n_vertices": 30}
 FAST = {**TARGET, "max_iterations": 1, "embedding": "direct", "fit": False, "threads": 1}
 QUICK_WORDS = ["-n", 30, "--max-iterations", 1, "--embedding", "direct", "--no-fit", "--workers", 0, "--no-thumbnails"]
@@ -261,7 +261,7 @@ def test_failed_jobs_are_tried_again_and_end_nothing(meshes, tmp_path):
 def test_shards_share_the_work_and_a_later_batch_knows_it(meshes, tmp_path):
     record, seen = Recorder(), []
     for shard in (1, 2):
-        rows = record.run(jobs(meshes), tmp_path / "out", Settings(workers=Workers(count=0), shard=(shard, 2)))
+        rows = record.run(jobs(meshes), tmp_path / "out", Settings(workers=WorkerPool(count=0), shard=(shard, 2)))
         seen += [row["output"] for row in rows]
     assert sorted(seen) == ["a.obj", "b.obj", "sub/a.obj"]
     assert len(record.run(jobs(meshes), tmp_path / "out")) == 3
@@ -300,7 +300,7 @@ def test_refusals_errors_and_warnings_are_in_the_row(meshes, tmp_path, monkeypat
 
     def row(name, **options):
         return do(
-            Task(
+            BatchTask(
                 job=Job(input=str(meshes / name), output="x.off", options={**FAST, **options}),
                 target=str(tmp_path / "x.off"),
             )
@@ -321,17 +321,17 @@ def test_refusals_errors_and_warnings_are_in_the_row(meshes, tmp_path, monkeypat
 
 
 def test_in_this_process_errors_are_outcomes():
-    outcomes = list(Workers(count=0).run(Work(do=lambda task, attempt: 1 / task), [2, 0, 4]))
+    outcomes = list(WorkerPool(count=0).run(Work(do=lambda task, attempt: 1 / task), [2, 0, 4]))
     assert outcomes == [Outcome(0, 0.5), Outcome(1, error="ZeroDivisionError: division by zero"), Outcome(2, 0.25)]
 
 
 def test_workers_without_dask_are_refused_with_the_remedy(monkeypatch):
     monkeypatch.setattr("anisomesh.batch.engine.has_dask", lambda: False)
-    assert Workers().in_this_process
-    assert Workers(count=1).in_this_process
+    assert WorkerPool().in_this_process
+    assert WorkerPool(count=1).in_this_process
     for words in ({"count": 2}, {"scheduler": "tcp://host:8786"}):
         with pytest.raises(AnisomeshError, match=r"anisomesh\[batch\]"):
-            Workers(**words)
+            WorkerPool(**words)
 
 
 def test_addresses_are_read_and_written(meshes, tmp_path):
@@ -342,7 +342,7 @@ def test_addresses_are_read_and_written(meshes, tmp_path):
     found = jobs_of(["memory://batch-in"], FAST, output_format="off")
     assert [job.output for job in found] == ["a.off", "sub/a.off"]
     assert [job.output for job in jobs_of(["memory://batch-in/*.obj"], FAST)] == ["a.obj"]
-    settings = Settings(workers=Workers(count=0), outputs="memory://batch-out/deep")
+    settings = Settings(workers=WorkerPool(count=0), outputs="memory://batch-out/deep")
     rows = run(found, tmp_path, settings=settings)
     assert [row["status"] for row in rows] == 2 * ["done"]
     assert memory.cat("/batch-out/deep/sub/a.off").startswith(b"OFF\n30 ")

@@ -210,10 +210,10 @@ def _cluster(scheduler: str | None, count: int) -> Iterator[Any]:
         with client:
             yield client
         return
-    how = {"threads_per_worker": 1, "processes": True, "dashboard_address": None, "silence_logs": logging.CRITICAL}
+    how = {"threads_per_worker": 1, "dashboard_address": "127.0.0.1:0", "silence_logs": logging.CRITICAL}
     with (
         dask.config.set(_LOCAL_CONFIG),
-        LocalCluster(n_workers=count, **how) as cluster,
+        LocalCluster(n_workers=count, processes=True, **how) as cluster,
         Client(cluster) as client,
     ):
         yield client

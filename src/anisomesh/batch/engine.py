@@ -53,7 +53,7 @@ class Outcome:
 
 
 @dataclass(frozen=True, kw_only=True)
-class Workers:
+class WorkerPool:
     """What runs the tasks.
 
     Attributes

@@ -11,7 +11,7 @@ from anisomesh.batch.places import absolute, exists, is_address, joined, suffix_
 from anisomesh.errors import OptionError
 from anisomesh.io.known_formats import MESH_FORMATS
 
-_SHOWN = 5  # missing files that a message names
+_MISSING_SHOWN = 5  # missing files that a message names
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -65,8 +65,8 @@ def checked(jobs: Sequence[Job], folder: str) -> list[Job]:
     found = [_in_one_form(job) for job in jobs]
     missing = [path for job in found for path in job.files.values() if not is_address(path) and not exists(path)]
     if missing:
-        more = f", and {len(missing) - _SHOWN:,} more" if len(missing) > _SHOWN else ""
-        raise OptionError(f"no such file: {', '.join(missing[:_SHOWN])}{more}")
+        more = f", and {len(missing) - _MISSING_SHOWN:,} more" if len(missing) > _MISSING_SHOWN else ""
+        raise OptionError(f"no such file: {', '.join(missing[:_MISSING_SHOWN])}{more}")
     _check_outputs(found, folder)
     return found
 

@@ -15,7 +15,7 @@ from anisomesh.batch.places import is_address, joined
 from anisomesh.errors import OptionError, why_unreadable
 from anisomesh.toml import check_keys
 
-_COLUMNS = ("input", "output", *OPTION_NAMES)
+_KNOWN_COLUMNS = ("input", "output", *OPTION_NAMES)
 _WORDS = {"true": True, "false": False, "yes": True, "no": False}
 _TEXTS = ("input", "output", "weights", "lock", *TABLES)
 
@@ -51,7 +51,7 @@ def read_manifest(path: Path, options: Options, *, output_format: str | None = N
         raise OptionError(f"{path} cannot be read as text: {error}") from error
     jobs = []
     for where, row in readers[path.suffix.lower()](str(path), text):
-        check_keys(where, row, _COLUMNS)
+        check_keys(where, row, _KNOWN_COLUMNS)
         jobs.append(_job(where, row, options, path.parent, output_format))
     if not jobs:
         raise OptionError(f"{path}: there is no row; expected one for each mesh")

@@ -13,7 +13,7 @@ from typing import Any
 from anisomesh.batch.places import is_address
 from anisomesh.batch.rows import Row, picture_of
 from anisomesh.io.atomic import atomic_path
-from anisomesh.io.web_page import Html, table, web_page
+from anisomesh.io.results.web_page import Html, table, web_page
 
 PAGE, PARQUET = "index.html", "results.parquet"
 _HEADING = (

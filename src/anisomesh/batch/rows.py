@@ -11,7 +11,7 @@ from anisomesh.batch.keys import facts_of_files, key_of
 from anisomesh.batch.places import exists, joined
 from anisomesh.errors import MeshFileError
 from anisomesh.io.atomic import append_line, atomic_path, drop_cut_line
-from anisomesh.io.json_lines import as_line, finite, not_a_row, read_rows
+from anisomesh.io.results.json_lines import as_line, finite, not_a_row, read_rows
 
 Row = dict[str, Any]
 _STEM, _SUFFIX = "results", ".jsonl"

@@ -10,12 +10,12 @@ from importlib.metadata import version
 from operator import attrgetter
 from pathlib import Path
 
-from anisomesh.batch.engine import Outcome, Work, Workers
+from anisomesh.batch.engine import Outcome, Work, WorkerPool
 from anisomesh.batch.jobs import Job, checked
 from anisomesh.batch.places import absolute, is_address, joined
 from anisomesh.batch.reports import PAGE, write_page, write_parquet
 from anisomesh.batch.rows import Results, Row, is_done, picture_of
-from anisomesh.batch.work import Task, do, prepare_process
+from anisomesh.batch.work import BatchTask, do, prepare_process
 from anisomesh.errors import OptionError
 from anisomesh.io.atomic import remove_leftovers
 
@@ -45,7 +45,7 @@ class Settings:
         hang, and its worker is ended; the limit alone ends the optimisation, not what makes the mesh valid.
     """
 
-    workers: Workers = field(default_factory=Workers)
+    workers: WorkerPool = field(default_factory=WorkerPool)
     shard: tuple[int, int] | None = None
     outputs: str | None = None
     thumbnails: bool = False
@@ -117,7 +117,7 @@ class Batch:
         on_row
             Called with every job that ends.
         work
-            What is done with a :class:`~anisomesh.batch.work.Task`, in place of a remesh, with the results of
+            What is done with a :class:`~anisomesh.batch.work.BatchTask`, in place of a remesh, with the results of
             :func:`~anisomesh.batch.work.do`.
 
         Returns
@@ -151,9 +151,9 @@ class Batch:
             write_parquet(rows, self.folder)
         return [self._rows[job.output] for job in self._jobs]
 
-    def _task(self, job: Job) -> Task:
+    def _task(self, job: Job) -> BatchTask:
         limit = job.options.get("time_limit")
-        return Task(
+        return BatchTask(
             job=job,
             target=joined(self._outputs, job.output),
             picture=picture_of(self.folder, job.output) if self.settings.thumbnails else None,

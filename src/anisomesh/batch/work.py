@@ -26,7 +26,7 @@ _PICTURE_SCALE = 0.5  # thinner lines than in a picture of normal size
 
 
 @dataclass(frozen=True, kw_only=True)
-class Task:
+class BatchTask:
     """A job for a worker: where the result goes, its picture, None for none, and the seconds after which it hangs."""
 
     job: Job
@@ -35,7 +35,7 @@ class Task:
     limit: float | None = None
 
 
-def do(task: Task, attempt: int = 1) -> dict[str, Any]:
+def do(task: BatchTask, attempt: int = 1) -> dict[str, Any]:
     """Remesh and return the row of a job; errors become rows too.
 
     Parameters
@@ -81,7 +81,7 @@ def prepare_process() -> None:
     remesh(sphere(1), n_vertices=20, max_iterations=1, embedding="direct", threads=1)
 
 
-def _remesh(task: Task, *, draw: bool) -> dict[str, Any]:
+def _remesh(task: BatchTask, *, draw: bool) -> dict[str, Any]:
     from anisomesh.io.meshes import load_mesh, save
     from anisomesh.pipeline import remesh
 

@@ -13,8 +13,8 @@ import numpy as np
 from anisomesh.bench.disturb import CLEAN
 from anisomesh.bench.runs import RunRow, select_rows
 from anisomesh.bench.suite import Suite
-from anisomesh.io.web_page import table as html_table
-from anisomesh.io.web_page import web_page as html_page
+from anisomesh.io.results.web_page import table as html_table
+from anisomesh.io.results.web_page import web_page as html_page
 
 
 @dataclass(frozen=True)

@@ -36,13 +36,13 @@ STATUSES = ("done", "refused", "failed")
 
 @takes_remesh_options(*(name for name in REMESH_OPTIONS if name != "threads"))
 def command(
+    out: Annotated[
+        str, typer.Option("--out", "-o", metavar="DIR", help="Folder of the meshes to write, and of the results.")
+    ],
     sources: Annotated[
         list[str] | None,
         typer.Argument(metavar="[IN...]", help="Meshes, folders with all meshes below them, patterns, addresses."),
     ] = None,
-    out: Annotated[
-        str, typer.Option("--out", "-o", metavar="DIR", help="Folder of the meshes to write, and of the results.")
-    ] = "",
     manifest: Annotated[
         Path | None,
         typer.Option(metavar="FILE", help="Jobs with options of their own: .jsonl, or .csv with a heading."),
@@ -92,12 +92,10 @@ def command(
 
     Give -n, --ratio, --max-error or --edge-length, or a manifest whose rows do. Exit code 3 if some meshes failed.
     """
-    from anisomesh.batch.engine import Workers
+    from anisomesh.batch.engine import WorkerPool
     from anisomesh.batch.places import is_address
     from anisomesh.batch.running import Settings
 
-    if not out:
-        raise typer.BadParameter("give --out DIR, the folder of the meshes to write")
     if is_address(out) and results is None:
         raise typer.BadParameter(f"--out {out} is not on this machine; give --results DIR, a folder that is")
     if output_format is not None:
@@ -112,7 +110,7 @@ def command(
     given |= {"threads": threads, "weld_tolerance": weld} | targets
     jobs = _jobs(sources or [], manifest, {k: v for k, v in given.items() if v is not None}, output_format, Path(out))
     settings = Settings(
-        workers=Workers(count=workers, scheduler=scheduler),
+        workers=WorkerPool(count=workers, scheduler=scheduler),
         shard=None if shard is None else _shard(shard),
         outputs=out,
         thumbnails=thumbnails and _can_draw(),

@@ -21,7 +21,7 @@ _STAGE_ORDER = ("load", "prepare", "metric", "embed", "cvt", "dual", "fit", "att
 
 def as_json(report: dict[str, Any]) -> str:
     """Return a report as strict JSON, with null in place of numbers that are not finite."""
-    from anisomesh.io.json_lines import finite
+    from anisomesh.io.results.json_lines import finite
 
     return json.dumps(finite(report), indent=2, allow_nan=False)
 

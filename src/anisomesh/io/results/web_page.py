@@ -33,7 +33,7 @@ document.querySelectorAll("th button").forEach(button => button.addEventListener
   body.append(...rows.filter(row => !empty(row)), ...rows.filter(empty));
 }));
 """
-_LONG = 60  # characters of a cell that is shown on several lines
+_LONG_CELL = 60  # characters of a cell that is shown on several lines
 
 
 class Html(str):
@@ -66,5 +66,7 @@ def web_page(title: str, parts: Sequence[str]) -> str:
 def _cell(cell: str) -> str:
     if isinstance(cell, Html):
         return f'<td class="text">{cell}</td>'
-    kind = ' class="text long"' if len(cell) > _LONG else "" if cell[:1].isdigit() or cell == "-" else ' class="text"'
+    kind = (
+        ' class="text long"' if len(cell) > _LONG_CELL else "" if cell[:1].isdigit() or cell == "-" else ' class="text"'
+    )
     return f"<td{kind}>{escape(cell)}</td>"
