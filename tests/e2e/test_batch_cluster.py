@@ -10,6 +10,7 @@ import time
 from pathlib import Path
 
 import pytest
+from batch_tasks import MEMORY, act, kill_every_tenth, limit
 
 from anisomesh.batch.engine import MAX_TRIES, Work, WorkerPool
 from anisomesh.batch.jobs import Job
@@ -22,40 +23,24 @@ pytest.importorskip("distributed")
 pytestmark = [pytest.mark.slow, pytest.mark.skipif(sys.platform == "win32", reason="signals")]
 
 
-def act(task, attempt):
-    """Do what a task says."""
-    if task["kind"] == "kill" and attempt <= task["times"]:
-        os.kill(os.getpid(), signal.SIGKILL)
-    if task["kind"] == "hang" and attempt <= task["times"]:
-        time.sleep(60)
-    if task["kind"] == "raise":
-        raise ValueError("not today")
-    return os.getpid()
-
-
-def limit(task):
-    return task.get("limit")
-
-
-def test_a_worker_that_ends_costs_its_task_a_try_and_nothing_else():
-    kinds = [("kill", 1), ("kill", MAX_TRIES), ("hang", 1), ("raise", 0), *[("plain", 0)] * 8]
+def test_a_worker_that_ends_costs_its_task_a_try_and_nothing_else(monkeypatch):
+    monkeypatch.setattr("distributed.system.MEMORY_LIMIT", 2 * MEMORY)
+    kinds = [("kill", MAX_TRIES), ("hang", 1), ("raise", 0), ("fill", 1), *[("plain", 0)] * 4]
     tasks = [{"kind": kind, "times": times, "limit": 2.0 if kind == "hang" else None} for kind, times in kinds]
     found = sorted(WorkerPool(count=2).run(Work(do=act, limit=limit), tasks), key=lambda outcome: outcome.number)
     assert [outcome.number for outcome in found] == list(range(len(tasks)))
-    assert [outcome.tries for outcome in found] == [2, MAX_TRIES, 2, *[1] * 9]
+    assert [outcome.tries for outcome in found] == [MAX_TRIES, 2, 1, 2, *[1] * 4]
     failed = [outcome.error for outcome in found if outcome.error is not None]
-    assert [outcome.error is None for outcome in found] == [True, False, True, False, *[True] * 8]
+    assert [outcome.error is None for outcome in found] == [False, True, False, *[True] * 5]
     assert "its worker ended in each of 3 tries" in failed[0]
     assert failed[1] == "ValueError: not today"
     assert os.getpid() not in {outcome.result for outcome in found}
 
 
-def kill_every_tenth(task, attempt):
-    """Write an output as a remesh does; the worker of every tenth job is killed in its first try."""
-    if int(Path(task.job.input).stem) % 10 == 9 and attempt == 1:
-        os.kill(os.getpid(), signal.SIGKILL)
-    Path(task.target).write_text(str(os.getpid()))
-    return {"status": "done", "key": None, "files": {}, "seconds": 0.0}
+def test_a_worker_that_is_killed_as_soon_as_it_has_started_is_started_again():
+    """Regression: it began a task before its parent knew it, and no worker was left when it ended."""
+    tasks = [{"kind": "kill", "times": 2}, {"kind": "plain", "times": 0}]
+    assert [outcome.tries for outcome in WorkerPool(count=1).run(Work(do=act), tasks)] == [3, 1]
 
 
 def jobs_in(folder, n):
@@ -92,15 +77,10 @@ SCRIPT = """
 import os, sys, time
 from pathlib import Path
 from anisomesh.batch.engine import Work, WorkerPool
-from test_batch_cluster import note_and_wait
+from batch_tasks import note_and_wait
 if __name__ == "__main__":
     list(WorkerPool(count=1).run(Work(do=note_and_wait), [sys.argv[1]]))
 """
-
-
-def note_and_wait(folder, attempt):
-    Path(folder, str(os.getpid())).touch()
-    time.sleep(300)
 
 
 def is_alive(pid):
@@ -123,7 +103,7 @@ def test_workers_end_with_their_parent(tmp_path, signum):
     script.write_text(SCRIPT)
     pids = tmp_path / "pids"
     pids.mkdir()
-    env = {**os.environ, "PYTHONPATH": os.pathsep.join([str(Path(__file__).parent), *sys.path])}
+    env = {**os.environ, "PYTHONPATH": os.pathsep.join(sys.path)}
     process = subprocess.Popen([sys.executable, script, pids], env=env, stderr=subprocess.DEVNULL)
     try:
         assert until(lambda: len(list(pids.iterdir())) == 1)

@@ -105,7 +105,9 @@ def test_faults_of_jobs_are_found_before_any_work(meshes, tmp_path):
         ([Job(input=a, output="x.ply", options={**TARGET, "ratio": 0.5})], "give one of n_vertices"),
         ([Job(input=a, output="x.ply", options={"n_vertexes": 30})], "did you mean 'n_vertices'"),
         ([Job(input=a, output="x.ply", options={**TARGET, "sharpness": 0.5})], "a.obj: sharpness = 0.5"),
-        ([Job(input=a, output="x.ply", options={"max_error": "1 mm"})], "max_error 1 mm: expected a length"),
+        ([Job(input=a, output="x.ply", options={"max_error": "1 mm"})], "a.obj: max_error 1 mm: expected a length"),
+        ([Job(input=a, output="x.ply", options={**TARGET, "density": [1.0, 2.0]})], "expected the name of a text file"),
+        ([Job(input=a, output="x.ply", options={**TARGET, "metric": [1, 2]})], "expected the name of a metric"),
         (
             [Job(input=a, output="x.ply", options={**TARGET, "density": str(tmp_path / "no.txt")})],
             "no such file: .*no.tx",

@@ -69,16 +69,17 @@ def run_on_cluster(
     Each task is sent to one worker and runs there alone, so that a worker that ends takes one task with it and no other
     is suspected. Workers of this machine end with this process, however it ends.
     """
-    with _cluster(scheduler, min(count or usable_cores(), len(tasks))) as client:
-        yield from _Dispatcher(client, work).outcomes(tasks)
+    with _cluster(scheduler, min(count or usable_cores(), len(tasks))) as (client, known):
+        yield from _Dispatcher(client, work, known).outcomes(tasks)
 
 
 class _Dispatcher:
-    """Gives tasks to the workers of a client that are free."""
+    """Gives tasks to the workers of a client that are free, among those that ``known`` returns if it is given."""
 
-    def __init__(self, client: Any, work: Work) -> None:
+    def __init__(self, client: Any, work: Work, known: Callable[[], set[str]] | None) -> None:
         self._client = client
         self._work = work
+        self._known = known
         self._ended: queue.SimpleQueue[_Try] = queue.SimpleQueue()
         self._running: dict[int, _Try] = {}
         self._free: dict[str, int] = {}  # threads that have no task, by worker
@@ -135,6 +136,8 @@ class _Dispatcher:
             threads = self._client.nthreads()
         except (OSError, CommClosedError, ValueError) as error:
             raise AnisomeshError(f"the scheduler of the cluster cannot be reached: {error}; start it again") from error
+        if self._known is not None:
+            threads = {name: count for name, count in threads.items() if name in self._known()}
         self._looked = time.monotonic()
         busy = [each.worker for each in self._running.values()]
         self._free = {name: count - busy.count(name) for name, count in threads.items()}
@@ -195,10 +198,14 @@ def _prepared(prepare: Callable[[], None]) -> None:
 
 
 @contextmanager
-def _cluster(scheduler: str | None, count: int) -> Iterator[Any]:
-    """Yield a client of a running cluster, or of one on this machine, which ends with the block."""
+def _cluster(scheduler: str | None, count: int) -> Iterator[tuple[Any, Callable[[], set[str]] | None]]:
+    """Yield a client of a running cluster, or of one on this machine, which ends with the block.
+
+    Beside it, on this machine, a function that returns the workers whose parents know that they have started: one that
+    ended before would not be started again.
+    """
     import dask
-    from distributed import Client, LocalCluster
+    from distributed import Client, LocalCluster, system
 
     if scheduler is not None:
         try:
@@ -208,12 +215,12 @@ def _cluster(scheduler: str | None, count: int) -> Iterator[Any]:
                 f"no scheduler answers at {scheduler}: {error}; start one with dask scheduler"
             ) from error
         with client:
-            yield client
+            yield client, None
         return
     how = {"threads_per_worker": 1, "dashboard_address": "127.0.0.1:0", "silence_logs": logging.CRITICAL}
     with (
         dask.config.set(_LOCAL_CONFIG),
-        LocalCluster(n_workers=count, processes=True, **how) as cluster,
+        LocalCluster(n_workers=count, processes=True, memory_limit=system.MEMORY_LIMIT // count, **how) as cluster,
         Client(cluster) as client,
     ):
-        yield client
+        yield client, lambda: {nanny.worker_address for nanny in cluster.workers.values()}

@@ -78,8 +78,9 @@ def _in_one_form(job: Job) -> Job:
             expected = ", ".join(sorted(MESH_FORMATS))
             raise OptionError(f"{where}: {place}: expected a file name ending in one of {expected}")
     options = plain_options(job.options, where)
-    options |= {name: absolute(options[name]) for name in TABLES if name in options}
-    return replace(job, input=absolute(job.input), options=options)
+    found = replace(job, input=absolute(job.input), options=options)
+    files = {name: absolute(place) for name, place in found.files.items() if name != "input"}
+    return replace(found, options=options | files)
 
 
 def _check_outputs(jobs: Sequence[Job], folder: str) -> None:

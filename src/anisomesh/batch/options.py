@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 from collections.abc import Callable
 from dataclasses import fields
 from typing import Any
@@ -44,18 +45,23 @@ def plain_options(options: Options, where: str) -> Options:
         If a name is unknown, a value is out of range, or not one option says how many vertices there are to be.
     """
     check_keys(where, options, OPTION_NAMES)
-    read = {name: _read(name, value) for name, value in options.items() if value is not None}
     try:
-        numbers = {name: value for name, value in in_model_units(read, diagonal=1.0).items() if name not in TABLES}
-        target = {name: numbers.pop(name, None) for name in TARGETS[:3]}
-        known = with_overrides(RemeshOptions(), numbers)
-        read_target(target["n_vertices"], target["ratio"], target["max_error"], known)
-        if known.has_tensors:
-            raise OptionError(f"metric = {known.metric!r}; expected the name of a metric")
+        read = {name: _read(name, value) for name, value in options.items() if value is not None}
+        _check(read)
     except OptionError as error:
         raise OptionError(f"{where}: {error}") from error
     default = RemeshOptions()
     return {name: value for name, value in read.items() if name in TARGETS or value != getattr(default, name)}
+
+
+def _check(options: Options) -> None:
+    """Raise OptionError if options cannot be the ones of a remesh of any mesh."""
+    keywords = {name: value for name, value in in_model_units(options, diagonal=1.0).items() if name not in TABLES}
+    target = {name: keywords.pop(name, None) for name in TARGETS[:3]}
+    known = with_overrides(RemeshOptions(), keywords)
+    read_target(target["n_vertices"], target["ratio"], target["max_error"], known)
+    if known.has_tensors:
+        raise OptionError(f"metric = {known.metric!r}; expected the name of a metric")
 
 
 def in_model_units(options: Options, diagonal: float) -> Options:
@@ -86,7 +92,13 @@ def that_matter(options: Options) -> Options:
 
 
 def _read(name: str, value: Any) -> Any:
-    """Return the value of an option; a text that is a number as the number."""
+    """Return the value of an option if it is plain; a text that is a number as the number."""
+    if isinstance(value, os.PathLike):
+        value = os.fspath(value)
+    items = value if isinstance(value, list | tuple) else [value]
+    if not all(isinstance(item, str if name in TABLES else str | int | float) for item in items):
+        expected = "the name of a text file" if name in TABLES else "a number, a text, true or false"
+        raise OptionError(f"{name} is of type {type(value).__name__}; expected {expected}")
     if not isinstance(value, str) or name in TABLES:
         return value
     if name == "ratio" and value.endswith("%"):

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import hashlib
 from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
@@ -9,7 +10,7 @@ from typing import Any
 from anisomesh.batch.jobs import Job
 from anisomesh.batch.keys import facts_of_files, key_of
 from anisomesh.batch.places import exists, joined
-from anisomesh.errors import MeshFileError
+from anisomesh.errors import AnisomeshError, MeshFileError
 from anisomesh.io.atomic import append_line, atomic_path, drop_cut_line
 from anisomesh.io.results.json_lines import as_line, finite, not_a_row, read_rows
 
@@ -75,7 +76,7 @@ class Results:
 
 def picture_of(folder: Path, output: str) -> Path:
     """Return the file of the thumbnail of an output, in the folder of the results."""
-    return folder / ".thumbnails" / f"{output.replace('/', '_')}.png"
+    return folder / ".thumbnails" / f"{hashlib.sha256(output.encode()).hexdigest()[:16]}.png"
 
 
 def is_done(job: Job, row: Row | None, outputs: str) -> bool:
@@ -90,7 +91,10 @@ def is_done(job: Job, row: Row | None, outputs: str) -> bool:
     """
     if row is None or row["status"] != "done" or not exists(joined(outputs, job.output)):
         return False
-    return bool(key_of(job, facts_of_files(job, row["files"])) == row["key"])
+    try:
+        return bool(key_of(job, facts_of_files(job, row["files"])) == row["key"])
+    except AnisomeshError:  # a file cannot be read, which the worker will say in its row
+        return False
 
 
 def _rows_of(path: Path) -> list[Row]:

@@ -136,6 +136,8 @@ class Batch:
         tasks = [self._task(job) for job in self.left]
         self.results.forget([job.output for job in self.left])
         remove_leftovers(Path(task.target) for task in tasks if not is_address(task.target))
+        for job in self.left:
+            picture_of(self.folder, job.output).unlink(missing_ok=True)
         start = time.monotonic()
         outcomes = self.settings.workers.run(work, tasks) if tasks else iter(())
         for count, outcome in enumerate(outcomes, 1):

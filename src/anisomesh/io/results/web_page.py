@@ -66,7 +66,6 @@ def web_page(title: str, parts: Sequence[str]) -> str:
 def _cell(cell: str) -> str:
     if isinstance(cell, Html):
         return f'<td class="text">{cell}</td>'
-    kind = (
-        ' class="text long"' if len(cell) > _LONG_CELL else "" if cell[:1].isdigit() or cell == "-" else ' class="text"'
-    )
-    return f"<td{kind}>{escape(cell)}</td>"
+    if cell[:1].isdigit() or cell == "-":
+        return f"<td>{escape(cell)}</td>"
+    return f'<td class="{"text long" if len(cell) > _LONG_CELL else "text"}">{escape(cell)}</td>'
