@@ -34,7 +34,7 @@ _LOCAL_CONFIG = {
 }
 
 
-@dataclass
+@dataclass(eq=False)
 class _Try:
     """A task on a worker: its number among all, which try it is, the limit on its seconds, and where it is."""
 
@@ -66,8 +66,8 @@ def run_on_cluster(
 
     Notes
     -----
-    Each task is sent to one worker and runs there alone, so that a worker that ends takes one task with it and no other
-    is suspected. Workers of this machine end with this process, however it ends.
+    Each task is sent to one worker and runs there alone, however many threads the worker has: a worker that ends takes
+    one task with it. Workers of this machine end with this process, however it ends.
     """
     with _cluster(scheduler, min(count or usable_cores(), len(tasks))) as (client, known):
         yield from _Dispatcher(client, work, known).outcomes(tasks)
@@ -82,7 +82,7 @@ class _Dispatcher:
         self._known = known
         self._ended: queue.SimpleQueue[_Try] = queue.SimpleQueue()
         self._running: dict[int, _Try] = {}
-        self._free: dict[str, int] = {}  # threads that have no task, by worker
+        self._workers: set[str] = set()
         self._looked = self._seen = time.monotonic()
 
     def outcomes(self, tasks: Sequence[Any]) -> Iterator[Outcome]:
@@ -91,9 +91,10 @@ class _Dispatcher:
         self._look()
         try:
             while waiting or self._running:
-                while waiting and (worker := next((name for name, free in self._free.items() if free), None)):
-                    number, attempt = waiting.popleft()
-                    self._begin(number, tasks[number], attempt, worker)
+                for worker in sorted(self._workers - {each.worker for each in self._running.values()}):
+                    if waiting:
+                        number, attempt = waiting.popleft()
+                        self._begin(number, tasks[number], attempt, worker)
                 for each in self._ended_tries():
                     outcome = self._outcome(each)
                     if outcome is None:
@@ -107,7 +108,6 @@ class _Dispatcher:
         future = self._client.submit(
             _guarded, self._work, task, attempt, workers=[worker], pure=False, retries=0, allow_other_workers=False
         )
-        self._free[worker] -= 1
         self._running[number] = each = _Try(number, attempt, self._work.limit(task), worker, future)
         future.add_done_callback(lambda _: self._ended.put(each))
 
@@ -121,27 +121,23 @@ class _Dispatcher:
         found = [each for each in found if self._running.get(each.number) is each]
         if time.monotonic() - self._looked >= _SECONDS_BETWEEN_LOOKS or any(map(_worker_ended, found)):
             self._look()
-        found += [each for each in self._running.values() if each.worker not in self._free and each not in found]
+        found += [each for each in self._running.values() if each.worker not in self._workers and each not in found]
         for each in found:
             del self._running[each.number]
-            if each.worker in self._free:
-                self._free[each.worker] += 1
         yield from found
 
     def _look(self) -> None:
-        """Learn which workers there are; those that have ended take their free threads with them."""
+        """Learn which workers there are."""
         from distributed.comm import CommClosedError
 
         try:
-            threads = self._client.nthreads()
+            self._workers = set(self._client.nthreads())
         except (OSError, CommClosedError, ValueError) as error:
             raise AnisomeshError(f"the scheduler of the cluster cannot be reached: {error}; start it again") from error
         if self._known is not None:
-            threads = {name: count for name, count in threads.items() if name in self._known()}
+            self._workers &= self._known()
         self._looked = time.monotonic()
-        busy = [each.worker for each in self._running.values()]
-        self._free = {name: count - busy.count(name) for name, count in threads.items()}
-        if threads:
+        if self._workers:
             self._seen = self._looked
         elif self._looked - self._seen > _SECONDS_WITHOUT_WORKERS:
             raise AnisomeshError(f"the cluster has had no worker for {_SECONDS_WITHOUT_WORKERS:g} s; start some")

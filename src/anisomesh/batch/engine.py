@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import importlib.util
 import os
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Generator, Iterator, Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -84,7 +84,7 @@ class WorkerPool:
         """Whether tasks run in this process, one after the other."""
         return self.scheduler is None and (self.count == 0 or not has_dask())
 
-    def run(self, work: Work, tasks: Sequence[Any]) -> Iterator[Outcome]:
+    def run(self, work: Work, tasks: Sequence[Any]) -> Generator[Outcome]:
         """Yield the outcomes of tasks, begun in this order, as they end; closing the iterator ends local workers."""
         if self.in_this_process:
             yield from _one_after_the_other(work, tasks)

@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import closing
 from dataclasses import dataclass, field
 from datetime import UTC, datetime
 from importlib.metadata import version
@@ -81,9 +82,9 @@ class Batch:
 
     Attributes
     ----------
-    left
-        The jobs of this shard that are not done. A job is done if its row says so, its output is there, and neither the
-        content of its files nor its options nor the version changed since.
+    jobs, left
+        The jobs of this shard, and the ones that are not done. A job is done if its row says so, its output is there,
+        and neither the content of its files nor its options nor the version changed since.
     results
         The rows.
 
@@ -100,10 +101,10 @@ class Batch:
         self.folder = Path(folder).absolute()
         self._outputs = str(self.folder) if self.settings.outputs is None else absolute(self.settings.outputs)
         first, step = self.settings.shard or (1, 1)
-        self._jobs = checked(jobs, self._outputs)[first - 1 :: step]
+        self.jobs = checked(jobs, self._outputs)[first - 1 :: step]
         self.results = Results(self.folder, self.settings.shard)
         self._rows = self.results.rows()
-        self.left = [job for job in self._jobs if not is_done(job, self._rows.get(job.output), self._outputs)]
+        self.left = [job for job in self.jobs if not is_done(job, self._rows.get(job.output), self._outputs)]
 
     def run(
         self,
@@ -138,20 +139,24 @@ class Batch:
         remove_leftovers(Path(task.target) for task in tasks if not is_address(task.target))
         for job in self.left:
             picture_of(self.folder, job.output).unlink(missing_ok=True)
-        start = time.monotonic()
-        outcomes = self.settings.workers.run(work, tasks) if tasks else iter(())
+        if tasks:
+            with closing(self.settings.workers.run(work, tasks)) as outcomes:
+                self._keep(outcomes, on_row)
+        if tasks or not (self.folder / PAGE).exists():
+            rows = list(self.results.rows().values())
+            write_page(rows, self.folder, self._outputs)
+            write_parquet(rows, self.folder)
+        return [self._rows[job.output] for job in self.jobs]
+
+    def _keep(self, outcomes: Iterator[Outcome], on_row: Callable[[Progress], None]) -> None:
+        """Add a row for every outcome, and tell of it."""
+        start, total = time.monotonic(), len(self.left)
         for count, outcome in enumerate(outcomes, 1):
             job = self.left[outcome.number]
             self._rows[job.output] = row = self.results.append(_row(job, outcome))
             if count == 1:  # what came before was the start of the workers
                 start = time.monotonic() - (row["seconds"] or 0.0)
-            seconds_left = (time.monotonic() - start) / count * (len(tasks) - count)
-            on_row(Progress(row, count, len(tasks), seconds_left))
-        if tasks or not (self.folder / PAGE).exists():
-            rows = list(self.results.rows().values())
-            write_page(rows, self.folder, self._outputs)
-            write_parquet(rows, self.folder)
-        return [self._rows[job.output] for job in self._jobs]
+            on_row(Progress(row, count, total, (time.monotonic() - start) / count * (total - count)))
 
     def _task(self, job: Job) -> BatchTask:
         limit = job.options.get("time_limit")

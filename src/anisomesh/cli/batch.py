@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
+import importlib.util
 import re
 import time
 from collections import Counter
+from dataclasses import replace
 from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
@@ -27,7 +29,7 @@ from anisomesh.options import MAX_THREADS
 
 if TYPE_CHECKING:
     from anisomesh.batch.jobs import Job
-    from anisomesh.batch.running import Progress, Settings
+    from anisomesh.batch.running import Batch, Progress, Settings
 
 SOME_FAILED = 3
 """Exit code if jobs were refused or failed."""
@@ -96,6 +98,7 @@ def command(
     from anisomesh.batch.places import is_address
     from anisomesh.batch.running import Settings
 
+    out = out.removeprefix("file://")
     if is_address(out) and results is None:
         raise typer.BadParameter(f"--out {out} is not on this machine; give --results DIR, a folder that is")
     if output_format is not None:
@@ -113,7 +116,7 @@ def command(
         workers=WorkerPool(count=workers, scheduler=scheduler),
         shard=None if shard is None else _shard(shard),
         outputs=out,
-        thumbnails=thumbnails and _can_draw(),
+        thumbnails=thumbnails,
     )
     _run(jobs, Path(results or out), settings, quiet)
 
@@ -139,10 +142,8 @@ def _shard(text: str) -> tuple[int, int]:
     return int(found[1]), int(found[2])
 
 
-def _can_draw() -> bool:
-    """Return whether pictures can be drawn; say so once if the extra is there and they cannot."""
-    import importlib.util
-
+def _can_draw(display: Display) -> bool:
+    """Return whether pictures can be drawn; say so if the extra is there and they cannot."""
     if any(importlib.util.find_spec(name) is None for name in ("pyvista", "matplotlib")):
         return False
     from anisomesh.errors import AnisomeshError
@@ -151,7 +152,7 @@ def _can_draw() -> bool:
     try:
         require_renderer()
     except AnisomeshError as error:
-        typer.echo(f"anisomesh: no thumbnails: {error}", err=True)
+        display.note(f"no thumbnails: {error}")
         return False
     return True
 
@@ -165,7 +166,7 @@ def _run(jobs: list[Job], folder: Path, settings: Settings, quiet: bool) -> None
     batch = Batch(jobs, folder, settings)
     with progress(quiet) as display:
         if batch.left:
-            _say_before(display, len(batch.left), len(jobs), settings)
+            _begin(display, batch)
         rows = batch.run(partial(_show, display))
     counts = Counter(row["status"] for row in rows)
     if not quiet:
@@ -179,11 +180,13 @@ def _run(jobs: list[Job], folder: Path, settings: Settings, quiet: bool) -> None
         raise typer.Exit(SOME_FAILED)
 
 
-def _say_before(display: Display, n_left: int, n_jobs: int, settings: Settings) -> None:
-    """Say how many jobs are left, and what runs them."""
-    if n_left < n_jobs:
-        display.note(f"{n_left:,} of {n_jobs:,} jobs are left")
-    if settings.workers.in_this_process and settings.workers.count != 0:
+def _begin(display: Display, batch: Batch) -> None:
+    """Say how many jobs are left, and what runs them; see whether thumbnails can be drawn."""
+    if len(batch.left) < len(batch.jobs):
+        display.note(f"{len(batch.left):,} of {len(batch.jobs):,} jobs are left")
+    batch.settings = replace(batch.settings, thumbnails=batch.settings.thumbnails and _can_draw(display))
+    workers = batch.settings.workers
+    if workers.in_this_process and workers.count != 0:
         display.note(
             "jobs run in this process, one after the other; "
             'for several workers, and if jobs crash or hang, run: pip install "anisomesh[batch]"'
