@@ -2,11 +2,42 @@
 
 from __future__ import annotations
 
+import math
+from dataclasses import dataclass
 from numbers import Integral, Real
 
 from anisomesh.errors import OptionError
 
 _LARGEST_INTEGER = 2**63 - 1
+
+
+@dataclass(frozen=True)
+class Length:
+    """A length in model units, or in per cent of the bounding-box diagonal of the mesh."""
+
+    value: float
+    relative: bool
+
+    @classmethod
+    def parse(cls, text: str, option: str) -> Length:
+        """Return the length in a text such as ``0.2`` or ``0.1%``.
+
+        Raises
+        ------
+        OptionError
+            If the text is not a positive finite number, with or without a per cent sign.
+        """
+        try:
+            value = float(text.removesuffix("%"))
+        except ValueError:
+            raise OptionError(f"{option} {text}: expected a length such as 0.2, or 0.1% of the diagonal") from None
+        if not (math.isfinite(value) and value > 0):
+            raise OptionError(f"{option} {text}: expected a positive finite length")
+        return cls(value, text.endswith("%"))
+
+    def on(self, diagonal: float) -> float:
+        """Return the length for a mesh with this bounding-box diagonal, in model units."""
+        return self.value / 100.0 * diagonal if self.relative else self.value
 
 
 def real_number(name: str, value: object, error: type[Exception] = OptionError) -> float:

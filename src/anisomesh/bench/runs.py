@@ -2,15 +2,12 @@
 
 from __future__ import annotations
 
-import json
 import time
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 from itertools import product
 from pathlib import Path
 from typing import Any
-
-import numpy as np
 
 from anisomesh.bench.disturb import CLEAN, disturbed
 from anisomesh.bench.inputs import Input, inputs_of
@@ -21,12 +18,15 @@ from anisomesh.errors import AnisomeshError
 from anisomesh.evaluation.report import evaluate
 from anisomesh.execution.isolation import isolated
 from anisomesh.io.atomic import append_line, drop_cut_line
+from anisomesh.io.results.json_lines import as_line, not_a_row
+from anisomesh.io.results.json_lines import read_rows as read_lines
 from anisomesh.mesh.surface import Surface
 from anisomesh.options import MIN_VERTICES
 from anisomesh.repair.prepare import prepare
 
 RunRow = dict[str, Any]
 ROW_KEY = ("mesh", "input", "ratio", "method", "seed")
+_ROW = "row of a benchmark"
 
 
 @dataclass(frozen=True)
@@ -94,7 +94,7 @@ def run_suite(
             loaded = None
             row = {**job.start, "status": "failed", "error": str(error)}
         if row["status"] != "absent":
-            append_line(out, json.dumps(row, default=_plain, allow_nan=False))
+            append_line(out, as_line(row))
         known[job.key] = row
         left = (time.monotonic() - start) / number * (len(jobs) - number)
         on_row(SuiteProgress(row, number, len(jobs), left))
@@ -113,17 +113,12 @@ def read_rows(path: Path) -> list[RunRow]:
         If a line is not a row.
     """
     rows = []
-    try:
-        lines = path.read_text(encoding="utf-8").splitlines() if path.exists() else []
-    except UnicodeDecodeError as error:
-        raise AnisomeshError(f"{path} is not a text file of benchmark rows; move it away") from error
-    for number, line in enumerate(lines, 1):
+    for number, row in read_lines(path, _ROW):
         try:
-            row = json.loads(line)
             row.setdefault("input", CLEAN)
             _key(row)
-        except (json.JSONDecodeError, KeyError, TypeError) as error:
-            raise AnisomeshError(f"{path}, line {number}: not a row of a benchmark; move the file away") from error
+        except (AttributeError, KeyError, TypeError) as error:
+            raise not_a_row(path, number, _ROW) from error
         validity = row.get("evaluation", {}).get("validity", {})
         if "flipped" in validity:
             validity["inverted"] = validity.pop("flipped")
@@ -215,9 +210,3 @@ def _run(job: _Job, loaded: _Loaded, suite: Suite, weights: Path | None) -> RunR
         "facts": result.facts,
         "evaluation": evaluation,
     }
-
-
-def _plain(value: Any) -> Any:
-    if isinstance(value, np.generic):
-        return value.item()
-    raise TypeError(f"{type(value).__name__} has no JSON form")

@@ -13,6 +13,8 @@ import numpy as np
 from anisomesh.bench.disturb import CLEAN
 from anisomesh.bench.runs import RunRow, select_rows
 from anisomesh.bench.suite import Suite
+from anisomesh.io.results.web_page import table as html_table
+from anisomesh.io.results.web_page import web_page as html_page
 
 
 @dataclass(frozen=True)
@@ -171,20 +173,8 @@ def web_page(suite: Suite, rows: Sequence[RunRow], chart: str = "") -> str:
     parts += [f"<p>{html.escape(text)}</p>" for text in (_remarks(rows), _LEGEND) if text]
     parts.append(chart[chart.find("<svg") :] if chart else "")
     for title, (heading, lines) in _sections(suite, rows):
-        head = "".join(f"<th>{html.escape(cell)}</th>" for cell in heading)
-        body = "\n".join("<tr>" + "".join(f"<td>{html.escape(cell)}</td>" for cell in line) + "</tr>" for line in lines)
-        parts.append(f"<h2>{title}</h2>\n<table>\n<tr>{head}</tr>\n{body}\n</table>")
-    return (
-        f'<!doctype html>\n<html lang="en"><head><meta charset="utf-8"><title>{html.escape(suite.name)}</title>\n'
-        f"<style>{_PAGE_CSS}</style></head><body>\n" + "\n".join(parts) + "\n</body></html>\n"
-    )
-
-
-_PAGE_CSS = (
-    "body{font:15px/1.5 system-ui,sans-serif;margin:2em}table{border-collapse:collapse}"
-    "th,td{padding:.2em .7em;border-bottom:1px solid #ddd;text-align:right;white-space:nowrap}"
-    "th{position:sticky;top:0;background:#fff}td:nth-child(-n+3),th:nth-child(-n+3){text-align:left}"
-)
+        parts += [f"<h2>{title}</h2>", html_table(heading, lines)]
+    return html_page(suite.name, parts)
 
 
 def _remarks(rows: Sequence[RunRow]) -> str:

@@ -4,19 +4,17 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable
-from dataclasses import dataclass
 from functools import partial
 from inspect import Parameter, Signature, signature
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any, TypeVar
+from typing import Annotated, Any, TypeVar
 
 import typer
 
+from anisomesh._values import Length
+from anisomesh.errors import OptionError
 from anisomesh.metric.names import MetricName
 from anisomesh.options import MAX_THREADS, DeviceName, EmbeddingName, RemeshOptions
-
-if TYPE_CHECKING:
-    from anisomesh.mesh.surface import Surface
 
 DEFAULT_OPTIONS = RemeshOptions()
 _option = partial(typer.Option, rich_help_panel="How to remesh")
@@ -207,35 +205,18 @@ def takes_remesh_options(*names: str) -> Callable[[_Command], _Command]:
     return decorate
 
 
-@dataclass(frozen=True)
-class Length:
-    """A length in model units, or in per cent of the bounding-box diagonal of the mesh."""
+def length(text: str, option: str) -> Length:
+    """Return the length in the text of an option, such as ``0.2`` or ``0.1%``.
 
-    value: float
-    relative: bool
-
-    @classmethod
-    def parse(cls, text: str, option: str) -> Length:
-        """Return the length in a text such as ``0.2`` or ``0.1%``.
-
-        Raises
-        ------
-        typer.BadParameter
-            If the text is not a positive finite number, with or without a per cent sign.
-        """
-        try:
-            value = float(text.removesuffix("%"))
-        except ValueError:
-            raise typer.BadParameter(
-                f"{option} {text}: expected a length such as 0.2, or 0.1% of the diagonal"
-            ) from None
-        if not (math.isfinite(value) and value > 0):
-            raise typer.BadParameter(f"{option} {text}: expected a positive finite length")
-        return cls(value, text.endswith("%"))
-
-    def on(self, surface: Surface) -> float:
-        """Return the length for a mesh, in model units."""
-        return self.value / 100.0 * surface.diagonal if self.relative else self.value
+    Raises
+    ------
+    typer.BadParameter
+        If the text is not a positive finite number, with or without a per cent sign.
+    """
+    try:
+        return Length.parse(text, option)
+    except OptionError as error:
+        raise typer.BadParameter(str(error)) from None
 
 
 Source = Annotated[Path, typer.Argument(metavar="IN", help="Mesh to remesh: OBJ, OFF, PLY, STL, GLB, 3MF, VTU, ...")]

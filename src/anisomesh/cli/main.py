@@ -1,6 +1,7 @@
 """Entry point of the ``anisomesh`` command: subcommands, exit codes, errors in one line.
 
-Exit codes: 0 done, 1 anisomesh refused or failed (one line on stderr), 2 wrong usage, 130 interrupted.
+Exit codes: 0 done, 1 anisomesh refused or failed (one line on stderr), 2 wrong usage, 3 some jobs of a batch failed,
+130 interrupted.
 """
 
 from __future__ import annotations
@@ -11,7 +12,7 @@ from typing import Annotated
 
 import typer
 
-from anisomesh.cli import benchmark, dataset, demo, evaluate, info, train
+from anisomesh.cli import batch, benchmark, dataset, demo, evaluate, info, train
 from anisomesh.cli.figures import group as figure
 from anisomesh.cli.log import logs
 from anisomesh.cli.ratios import RatiosCommand
@@ -33,6 +34,7 @@ app.command("evaluate")(logs(evaluate.command))
 app.add_typer(figure.app, name="figure")
 app.command("info")(logs(info.command))
 app.command("demo")(logs(demo.command))
+app.command("batch")(logs(batch.command))
 app.command("benchmark")(logs(benchmark.command))
 app.add_typer(dataset.app, name="dataset")
 app.command("train")(logs(train.command))
@@ -71,7 +73,7 @@ def main(arguments: list[str]) -> int:
     Returns
     -------
     int
-        0 done, 1 failed with one line on stderr, 2 wrong usage, 130 interrupted.
+        0 done, 1 failed with one line on stderr, 2 wrong usage, 3 some jobs of a batch failed, 130 interrupted.
     """
     try:
         status = app(args=arguments, prog_name="anisomesh", standalone_mode=False) or 0

@@ -21,6 +21,7 @@ _STAGE_LABELS = {
     "attributes": "carrying attributes over",
     "search": "searching the number of vertices",
     "level": "level of detail",
+    "batch": "remeshing",
 }
 _SECONDS_BETWEEN_LINES = 5.0  # heuristic
 

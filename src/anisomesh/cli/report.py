@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import json
-import math
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -24,17 +23,9 @@ _STAGE_ORDER = ("load", "prepare", "metric", "embed", "cvt", "dual", "fit", "att
 
 def as_json(report: dict[str, Any]) -> str:
     """Return a report as strict JSON, with null in place of numbers that are not finite."""
-    return json.dumps(_finite(report), indent=2, allow_nan=False)
+    from anisomesh.io.results.json_lines import finite
 
-
-def _finite(value: Any) -> Any:
-    if isinstance(value, dict):
-        return {key: _finite(item) for key, item in value.items()}
-    if isinstance(value, list | tuple):
-        return [_finite(item) for item in value]
-    if isinstance(value, float) and not math.isfinite(value):
-        return None
-    return value
+    return json.dumps(finite(report), indent=2, allow_nan=False)
 
 
 def write_json(report: dict[str, Any], path: Path) -> None:

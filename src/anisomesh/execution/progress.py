@@ -14,7 +14,7 @@ class StepInfo:
     ----------
     stage
         ``"load"``, ``"prepare"``, ``"metric"``, ``"embed"``, ``"cvt"``, ``"dual"``, ``"fit"``,
-        ``"attributes"``, ``"search"`` or ``"level"``.
+        ``"attributes"``, ``"search"`` or ``"level"``; ``"batch"`` for a job of many.
     iteration, total
         Iterations done, and an upper bound on them; 0 where a stage has none.
     energy

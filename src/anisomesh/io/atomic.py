@@ -3,13 +3,19 @@
 from __future__ import annotations
 
 import os
+import re
 import secrets
 import shutil
-from collections.abc import Iterator, Sequence
+from collections import defaultdict
+from collections.abc import Iterable, Iterator, Sequence
 from contextlib import contextmanager
+from itertools import product
 from pathlib import Path
 
 from anisomesh.errors import MeshFileError
+
+_MAX_STEM = 80  # characters of the name of a file in the name of its temporary file
+_RANDOM = re.compile("[0-9a-f]{8}")  # in the name of a temporary file
 
 
 @contextmanager
@@ -95,7 +101,7 @@ def _places(path: str | os.PathLike[str]) -> tuple[Path, Path]:
         raise MeshFileError(f"{path}: cannot be written: the folder {target.parent} does not exist; create it first")
     if is_other:
         raise MeshFileError(f"{path}: cannot be written: it exists and is not a plain file; choose another name")
-    return target, target.with_name(f".{target.stem[:80]}.{secrets.token_hex(4)}{target.suffix}")
+    return target, target.with_name(_temporary_name(target, secrets.token_hex(4)))
 
 
 def _put(temporary: Path, target: Path) -> None:
@@ -111,6 +117,29 @@ def _second_name(file: Path, name: Path) -> None:
         os.link(file, name)
     except OSError:
         shutil.copy2(file, name)
+
+
+def remove_leftovers(paths: Iterable[Path]) -> None:
+    """Remove the temporary files that killed processes left beside files that they were writing.
+
+    Parameters
+    ----------
+    paths
+        The files that were to be written; nothing may be writing them now.
+    """
+    folders = defaultdict(list)
+    for path in paths:
+        folders[path.resolve().parent].append(path.resolve())
+    for folder, targets in folders.items():
+        hidden = [path.name for path in folder.glob(".*")] if folder.is_dir() else []
+        for target, name in product(targets, hidden):
+            random = name.removeprefix(f".{target.stem[:_MAX_STEM]}.").removesuffix(target.suffix)
+            if re.fullmatch(_RANDOM, random) and name == _temporary_name(target, random):
+                (folder / name).unlink(missing_ok=True)
+
+
+def _temporary_name(target: Path, random: str) -> str:
+    return f".{target.stem[:_MAX_STEM]}.{random}{target.suffix}"
 
 
 def append_line(path: Path, line: str) -> None:

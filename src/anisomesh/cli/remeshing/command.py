@@ -11,9 +11,9 @@ import typer
 
 from anisomesh.cli.arguments import (
     REMESH_OPTIONS,
-    Length,
     Quiet,
     Source,
+    length,
     positive,
     share,
     takes_remesh_options,
@@ -197,9 +197,7 @@ def command(
         "max_size": max_size,
         "weld": None if weld == "auto" else weld,
     }
-    lengths = {
-        name: Length.parse(text, f"--{name.replace('_', '-')}") for name, text in texts.items() if text is not None
-    }
+    lengths = {name: length(text, f"--{name.replace('_', '-')}") for name, text in texts.items() if text is not None}
     files_of = partial(LevelOutputs, levels=n_levels) if n_levels else Outputs
     outputs = files_of(
         mesh=default_output(source, input_format, output_format) if out is None else out,
@@ -229,7 +227,7 @@ def command(
         mesh, seconds = read_mesh(source, input_format)
         _check_tables(mesh.surface, options, features, density)
         options |= {**target, "gradation": gradation}
-        options |= {name: length.on(mesh.surface) for name, length in lengths.items()}
+        options |= {name: given.on(mesh.surface.diagonal) for name, given in lengths.items()}
         if weld is not None:
             options["weld_tolerance"] = options.pop("weld", weld)
         if prescribed is not None:

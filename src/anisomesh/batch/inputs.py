@@ -1,0 +1,102 @@
+"""Jobs from names on the command line: files, folders, patterns and addresses."""
+
+from __future__ import annotations
+
+import glob
+from collections.abc import Sequence
+from pathlib import Path, PurePosixPath
+
+from anisomesh.batch.jobs import Job
+from anisomesh.batch.options import Options
+from anisomesh.batch.places import absolute, files_below, is_address, suffix_of
+from anisomesh.errors import OptionError, why_unreadable
+from anisomesh.io.known_formats import MESH_FORMATS
+
+
+def jobs_of(
+    names: Sequence[str], options: Options, *, output_format: str | None = None, without: Path | None = None
+) -> list[Job]:
+    """Return the jobs for files, folders with all meshes below them, and patterns such as ``scans/**/*.ply``.
+
+    Parameters
+    ----------
+    names
+        The files, folders and patterns, also as addresses such as ``s3://bucket/scans``.
+    options
+        Options of every job.
+    output_format
+        Format of the outputs, such as ``ply``; by default the one of each input.
+    without
+        A folder whose meshes are left out: the one that the outputs are written to.
+
+    Returns
+    -------
+    jobs
+        Each mesh once. The output has the name of the input, and keeps the folders below the one that was named, or
+        below the part of a pattern before its first ``*``.
+
+    Raises
+    ------
+    OptionError
+        If a file, folder or pattern has no mesh.
+    """
+    found: dict[str, str] = {}
+    for name in names:
+        for path, relative in _meshes(name, without):
+            found.setdefault(path, relative)
+    return [
+        Job(input=path, output=in_format(relative, output_format), options=options) for path, relative in found.items()
+    ]
+
+
+def _meshes(name: str, without: Path | None) -> list[tuple[str, str]]:
+    """Return the meshes that are meant by a name, each with its path below the folder that was named."""
+    if is_address(name):
+        return _addresses(name)
+    path = Path(absolute(name))
+    if path.is_file():
+        return [(str(path), path.name)]
+    if path.is_dir():
+        base, paths = path, sorted(path.rglob("*"))
+    elif glob.has_magic(name):
+        base = _fixed_part(path)
+        paths = sorted(base.glob(str(path.relative_to(base))))
+    else:
+        raise OptionError(
+            f"{name}: {why_unreadable(path, FileNotFoundError())}; expected a mesh, a folder or a pattern"
+        )
+    hidden = None if without is None else without.resolve()
+    meshes = [p for p in paths if p.suffix.lower() in MESH_FORMATS and p.is_file() and not _is_hidden(p, base)]
+    meshes = [p for p in meshes if hidden is None or hidden not in p.resolve().parents]
+    if not meshes:
+        raise OptionError(f"{name}: there is no mesh; expected files ending in {', '.join(sorted(MESH_FORMATS))}")
+    return [(str(p), p.relative_to(base).as_posix()) for p in meshes]
+
+
+def _addresses(name: str) -> list[tuple[str, str]]:
+    files = files_below(name)
+    if files is None:
+        return [(name, Path(name).name)]
+    base = name.partition("*")[0].rpartition("/")[0] if "*" in name else name.rstrip("/")
+    meshes = [file for file in files if suffix_of(file) in MESH_FORMATS]
+    if not meshes:
+        raise OptionError(f"{name}: there is no mesh; expected files ending in {', '.join(sorted(MESH_FORMATS))}")
+    return [(file, file.removeprefix(base).lstrip("/")) for file in meshes]
+
+
+def _fixed_part(pattern: Path) -> Path:
+    """Return the folders of a pattern before the first that has a sign of a pattern."""
+    parts = list(pattern.parts[:-1])
+    first = next((k for k, part in enumerate(parts) if glob.has_magic(part)), len(parts))
+    return Path(*parts[:first])
+
+
+def _is_hidden(path: Path, base: Path) -> bool:
+    return any(part.startswith(".") for part in path.relative_to(base).parts)
+
+
+def in_format(name: str, output_format: str | None) -> str:
+    """Return the name of an output with the suffix of a format, such as ``ply``; None for the suffix that it has."""
+    return (
+        name if output_format is None else str(PurePosixPath(name).with_suffix("." + output_format.lower().lstrip(".")))
+    )

@@ -1,0 +1,103 @@
+"""What a batch does: jobs, each with an input, an output and its options, checked before any work."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, field, replace
+from pathlib import Path
+
+from anisomesh.batch.options import TABLES, Options, plain_options
+from anisomesh.batch.places import absolute, exists, is_address, joined, suffix_of
+from anisomesh.errors import OptionError
+from anisomesh.io.known_formats import MESH_FORMATS
+
+_MISSING_SHOWN = 5  # missing files that a message names
+
+
+@dataclass(frozen=True, kw_only=True)
+class Job:
+    """One remesh of a batch.
+
+    Attributes
+    ----------
+    input
+        The mesh: a path, or an address of a file system that fsspec knows, such as ``s3://bucket/part.ply``.
+    output
+        The file to write, whose suffix is its format; relative to the folder of the batch, or absolute, or an address.
+    options
+        Keywords of :func:`anisomesh.pipeline.remesh` with plain values: ``n_vertices``, ``ratio`` (also ``"20%"``),
+        ``max_error`` or ``edge_length`` (also ``"0.1%"`` of the diagonal), and others; of ``features``, ``keep_points``
+        and ``density`` the names of text files.
+    """
+
+    input: str
+    output: str
+    options: Options = field(default_factory=dict)
+
+    @property
+    def files(self) -> dict[str, str]:
+        """The files that the job reads, by what they are: ``"input"``, or the name of an option."""
+        named = {name: self.options[name] for name in TABLES if name in self.options}
+        weights = self.options.get("weights")
+        if weights is not None and exists(str(weights)):  # else the name of a pretrained network
+            named["weights"] = str(weights)
+        return {"input": self.input, **named}
+
+
+def checked(jobs: Sequence[Job], folder: str) -> list[Job]:
+    """Return jobs with absolute inputs and options in one form, after checking them all.
+
+    Parameters
+    ----------
+    jobs
+        The jobs.
+    folder
+        The folder, or the address of one, that outputs are relative to.
+
+    Raises
+    ------
+    OptionError
+        If there is no job, an option is unknown or out of range, an input or another file is missing, a format is
+        unknown, or two jobs write the same file, or one writes the input of any.
+    """
+    if not jobs:
+        raise OptionError("there is no mesh to remesh; name files, folders or a manifest")
+    found = [_in_one_form(job) for job in jobs]
+    missing = [path for job in found for path in job.files.values() if not is_address(path) and not exists(path)]
+    if missing:
+        more = f", and {len(missing) - _MISSING_SHOWN:,} more" if len(missing) > _MISSING_SHOWN else ""
+        raise OptionError(f"no such file: {', '.join(missing[:_MISSING_SHOWN])}{more}")
+    _check_outputs(found, folder)
+    return found
+
+
+def _in_one_form(job: Job) -> Job:
+    where = f"the job for {job.input}"
+    for place in (job.input, job.output):
+        if suffix_of(place) not in MESH_FORMATS:
+            expected = ", ".join(sorted(MESH_FORMATS))
+            raise OptionError(f"{where}: {place}: expected a file name ending in one of {expected}")
+    options = plain_options(job.options, where)
+    found = replace(job, input=absolute(job.input), options=options)
+    files = {name: absolute(place) for name, place in found.files.items() if name != "input"}
+    return replace(found, options=options | files)
+
+
+def _check_outputs(jobs: Sequence[Job], folder: str) -> None:
+    """Raise OptionError if two jobs write the same file, or one writes a file that is an input."""
+    inputs = {_identity(job.input) for job in jobs}
+    writers: dict[str, Job] = {}
+    for job in jobs:
+        output = _identity(joined(folder, job.output))
+        if output in inputs:
+            raise OptionError(f"{job.output} is an input and would be overwritten; choose another folder or name")
+        first = writers.setdefault(output, job)
+        if first is not job:
+            raise OptionError(
+                f"{first.input} and {job.input} would both be written to {job.output}; give them outputs of their own, "
+                "in a manifest, or name a folder that contains both"
+            )
+
+
+def _identity(place: str) -> str:
+    return place if is_address(place) else str(Path(place).resolve())
