@@ -402,7 +402,7 @@ def test_command_does_what_is_left_and_says_if_some_failed(run_cli, meshes, tmp_
         (["IN", "-n", 30, "--shard", "3/2"], 2, "--shard 3/2"),
         (["IN", "--max-error", "1mm"], 2, "expected a length"),
         (["IN", "-n", 30, "--output-format", "docx"], 2, "docx"),
-        (["IN", "-n", 30, "--ratio", 0.5], 1, "give one of n_vertices"),
+        (["IN", "-n", 30, "--ratio", 0.5], 1, "give one of --vertices, --ratio"),
         (["IN/no.obj", "-n", 30], 1, "no such file"),
     ],
 )

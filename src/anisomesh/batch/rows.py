@@ -11,8 +11,8 @@ from anisomesh.batch.jobs import Job
 from anisomesh.batch.keys import facts_of_files, key_of
 from anisomesh.batch.places import exists, joined
 from anisomesh.errors import AnisomeshError, MeshFileError
-from anisomesh.io.atomic import append_line, atomic_path, drop_cut_line
-from anisomesh.io.results.json_lines import as_line, finite, not_a_row, read_rows
+from anisomesh.io.atomic import atomic_path
+from anisomesh.io.results.json_lines import append_line, as_line, drop_cut_line, finite, not_a_row, read_rows
 
 Row = dict[str, Any]
 _STEM, _SUFFIX = "results", ".jsonl"

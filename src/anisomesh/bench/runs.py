@@ -17,8 +17,7 @@ from anisomesh.bench.training import train_networks
 from anisomesh.errors import AnisomeshError
 from anisomesh.evaluation.report import evaluate
 from anisomesh.execution.isolation import isolated
-from anisomesh.io.atomic import append_line, drop_cut_line
-from anisomesh.io.results.json_lines import as_line, not_a_row
+from anisomesh.io.results.json_lines import append_line, as_line, drop_cut_line, not_a_row
 from anisomesh.io.results.json_lines import read_rows as read_lines
 from anisomesh.mesh.surface import Surface
 from anisomesh.options import MIN_VERTICES

@@ -17,11 +17,11 @@ _SPELLINGS = {
     for name in (*(field.name for field in fields(RemeshOptions)), "n_vertices", "ratio", "max_error")
     if name not in _PYTHON_ONLY
 }
-_SEVERAL_WORDS = "|".join(name for name in _SPELLINGS if "_" in name)
-_ONE_WORD = "|".join(name for name in _SPELLINGS if "_" not in name)
+_UNMISTAKABLE = "|".join(name for name in _SPELLINGS if "_" in name or name == "ratio")
+_WORDS = "|".join(name for name in _SPELLINGS if not re.fullmatch(_UNMISTAKABLE, name))
 _NAME = re.compile(
-    rf"(?<![\w./\\'\"-])({_SEVERAL_WORDS})(?!\w|[./\\'\"-]\w)"  # not in file names and quotations
-    rf"|(?:(?<=^)|(?<=: ))({_ONE_WORD})(?=\[| = | has \d| ['\d])"  # in front of a value: they are words of English
+    rf"(?<![\w./\\'\"-])({_UNMISTAKABLE})(?!\w|[./\\'\"-]\w)"  # not in file names and quotations
+    rf"|(?:(?<=^)|(?<=: ))({_WORDS})(?=\[| = | has \d| ['\d])"  # in front of a value: they are words of English
 )
 
 

@@ -1,4 +1,4 @@
-"""Atomic writing: a reader never sees an incomplete file, and a line list survives a killed process."""
+"""Atomic writing: a reader never sees an incomplete file."""
 
 from __future__ import annotations
 
@@ -140,19 +140,3 @@ def remove_leftovers(paths: Iterable[Path]) -> None:
 
 def _temporary_name(target: Path, random: str) -> str:
     return f".{target.stem[:_MAX_STEM]}.{random}{target.suffix}"
-
-
-def append_line(path: Path, line: str) -> None:
-    """Append a line to a file, which is created if missing, and flush it to the disk."""
-    with path.open("a", encoding="utf-8") as file:
-        file.write(line + "\n")
-        file.flush()
-        os.fsync(file.fileno())
-
-
-def drop_cut_line(path: Path) -> None:
-    """Remove an incomplete last line, left by a process that was killed while writing it."""
-    if path.exists():
-        content = path.read_bytes()
-        if content and not content.endswith(b"\n"):
-            os.truncate(path, content.rfind(b"\n") + 1)

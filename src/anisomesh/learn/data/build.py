@@ -11,8 +11,9 @@ import numpy as np
 
 from anisomesh.errors import AnisomeshError, OptionError
 from anisomesh.execution.isolation import isolated
-from anisomesh.io.atomic import append_line, atomic_path, drop_cut_line
+from anisomesh.io.atomic import atomic_path
 from anisomesh.io.meshes import load
+from anisomesh.io.results.json_lines import append_line, drop_cut_line
 from anisomesh.learn.data.items import save_item
 from anisomesh.learn.data.make import UnsuitableError, items_of_blobs, items_of_mesh, require_packages
 from anisomesh.learn.data.manifest import MANIFEST, ManifestRow, read_manifest
