@@ -36,6 +36,9 @@ OUT = Path(__file__).parent / "out" / "quality.jsonl"
 BAD, CAD, SMOOTH = "bad triangles", "CAD", "smooth"
 MIN_QUALITY = 0.7  # area-weighted mean quality of the triangles, below which a mesh is badly triangulated
 FLAT_HEIGHT = 1e-6  # of the diagonal: corners this near to the plane of the closest input facet lie in it
+IN_PLANE = 1e-7  # of the diagonal: about as single precision rounds coordinates
+PLACES = np.array([[1, 1, 1], [4, 1, 1], [1, 4, 1], [1, 1, 4], [18, 1, 1], [1, 18, 1], [1, 1, 18]], dtype=np.float64)
+"""Barycentric coordinates, times a factor, of places of a triangle at which it is compared with the input."""
 
 
 @dataclass(frozen=True)
@@ -106,6 +109,22 @@ def flat_quality(result: RemeshResult) -> float | None:
     return float(euclidean_quality(mesh)[flat].mean()) if flat.any() else None
 
 
+def vertices_at_planes(result: RemeshResult) -> tuple[int, int]:
+    """Return how many vertices have a triangle over one plane of the input, and how many of these are off the plane.
+
+    A triangle is over a plane if the input facets closest to several places of it have that plane.
+    """
+    reference, mesh = result.prepared, result.surface
+    places = np.einsum("kc,fcx->fkx", PLACES / PLACES.sum(axis=1, keepdims=True), mesh.points[mesh.faces])
+    facet = ClosestPoints(reference).locate(places.reshape(-1, 3))[0].reshape(len(mesh.faces), -1)
+    normal = reference.face_normals[facet]
+    height = np.einsum("fkx,fkx->fk", normal, reference.points[reference.faces[facet, 0]])
+    tolerance = IN_PLANE * reference.diagonal
+    over = (np.ptp(height, axis=1) < tolerance) & (np.ptp(normal, axis=1).max(axis=1) < IN_PLANE)
+    off = np.abs(np.einsum("fcx,fx->fc", mesh.points[mesh.faces[over]], normal[over, 0]) - height[over, :1]) > tolerance
+    return len(np.unique(mesh.faces[over])), len(np.unique(mesh.faces[over][off]))
+
+
 def measure(run: Run) -> dict[str, Any]:
     result = anisomesh.remesh(
         anisomesh.load(run.case.path), ratio=run.ratio, sharpness=run.sharpness, metric=run.metric, embedding="direct"
@@ -123,6 +142,7 @@ def measure(run: Run) -> dict[str, Any]:
         "g_mean": evaluation.shape.g_mean,
         "g_working": quality_in_own_metric(result),
         "flat_quality": flat_quality(result),
+        "at_planes": vertices_at_planes(result),
         "mean_square": distance.mean_square_ab + distance.mean_square_ba,
         "over_quadric": (distance.rms + EXACT) / (quadric.rms / result.prepared.diagonal + EXACT),
         "hausdorff": distance.hausdorff,
@@ -131,7 +151,7 @@ def measure(run: Run) -> dict[str, Any]:
     }
 
 
-def read_rows(path: Path, newest: str = "over_quadric") -> list[dict[str, Any]]:
+def read_rows(path: Path, newest: str = "at_planes") -> list[dict[str, Any]]:
     """Return the rows of earlier calls that have the figure added last; the ones of older versions are left out."""
     rows = [json.loads(line) for line in path.read_text().splitlines()] if path.exists() else []
     return [row for row in rows if newest in row]

@@ -41,19 +41,21 @@ def faults(row: dict[str, Any]) -> list[str]:
 
 def tables(rows: list[dict[str, Any]]) -> str:
     lines = [
-        "| metric | s | ratio | meshes | G | G, working metric | G, least | flat triangles | creases | E2 [1e-7 D²] "
-        "| RMS over quadric decimation | largest | HD [1e-3 D] | time [s], mean | median | faults |",
-        "|" + "---|" * 16,
+        "| metric | s | ratio | meshes | G | G, working metric | G, least | flat triangles | off planes | creases "
+        "| E2 [1e-7 D²] | RMS over quadric decimation | largest | HD [1e-3 D] | time [s], mean | median | faults |",
+        "|" + "---|" * 17,
     ]
     for group in grouped(rows):
         flat = [row["flat_quality"] for row in group if row["flat_quality"] is not None]
         seconds = [row["seconds"]["total"] for row in group]
+        at_planes, off_planes = np.sum([row["at_planes"] for row in group], axis=0)
         cells = [
             *headings(group),
             f"{mean(group, 'g_mean'):.3f}",
             f"{mean(group, 'g_working'):.3f}",
             f"{min(row['g_mean'] for row in group):.3f}",
             f"{np.mean(flat):.3f}" if flat else "",
+            f"{off_planes / at_planes:.1%}" if at_planes else "",
             f"{mean(group, 'creases'):.1%}",
             f"{geometric_mean(group, 'mean_square') * 1e7:.2f}",
             f"{geometric_mean(group, 'over_quadric'):.2f}",

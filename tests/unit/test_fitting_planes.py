@@ -85,3 +85,14 @@ def test_a_coarse_mesh_of_a_sphere_stays():
     movable = np.ones(coarse.n_points, dtype=bool)
     moved = onto_planes(coarse.points, coarse.faces, samples, owner, movable)
     assert np.array_equal(moved, coarse.points)
+
+
+def test_points_of_a_round_rim_are_in_the_plane_of_its_cap():
+    fine, coarse = (shapes.cylinder(radius=0.5, height=1.0, n_around=n) for n in (64, 60))
+    samples, _ = samples_on(fine, 20_000)
+    owner = ClosestPoints(coarse).locate(samples.points)[0].astype(np.int32)
+    noise = np.random.default_rng(1).uniform(-1e-5, 1e-5, coarse.points.shape)
+    moved = onto_planes(coarse.points + noise, coarse.faces, samples, owner, np.ones(coarse.n_points, dtype=bool))
+    at_cap = np.unique(coarse.faces[np.abs(coarse.face_normals[:, 2]) > 0.9])
+    assert len(at_cap) > 100
+    assert np.abs(moved - coarse.points)[at_cap, 2].max() < 1e-12

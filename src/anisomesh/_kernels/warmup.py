@@ -40,6 +40,7 @@ _FIT = (  # exchanges of edges compile more, where there are any
     fit_samples.fit_error,
     fit_samples.quality_sum,
     fit_planes.face_planes,
+    fit_planes.place_on_planes,
     fit_splits.split_gains,
 )
 _DECIMATE = (decimate.set_quadrics, decimate.decimate)

@@ -6,12 +6,11 @@ import numpy as np
 import numpy.typing as npt
 
 from anisomesh._arrays import FaceLabels, Faces, PointMask, Points
-from anisomesh._kernels.fit_planes import face_planes
+from anisomesh._kernels.fit_planes import face_planes, place_on_planes
 from anisomesh.fitting.samples import SurfaceSamples
 
 _SAME_PLANE = 1e-7  # distance at bounding-box diagonal 1: about as coordinates of single precision are rounded
 _MAX_STEP = 0.02  # of the shortest edge at a point: what hardly changes shapes and distances
-_MIN_ANGLE_EIGENVALUE = 1e-3  # of a sum of n n^t: planes with a smaller angle leave a point where it is
 
 
 def onto_planes(points: Points, faces: Faces, samples: SurfaceSamples, owner: FaceLabels, movable: PointMask) -> Points:
@@ -30,24 +29,20 @@ def onto_planes(points: Points, faces: Faces, samples: SurfaceSamples, owner: Fa
 
     Notes
     -----
-    A fit ends before all points are in planes: every sweep takes a part of the way. A point goes to the nearest place
-    in all planes of triangles around it, if it lies in every one of them there, and if that is within a fiftieth of the
-    shortest edge: farther off are points that stand for more than a plane, as where a crease has too few.
+    A fit ends before all points are in planes: every sweep takes a part of the way. A point goes to the planes of the
+    triangles around it, of large triangles first, as far as it can be in all of them, and if they are within a fiftieth
+    of the shortest edge: farther off are points that stand for more than a plane, as where a crease has too few.
     """
     planes = _planes_of_faces(points, faces, samples, owner)
     flat = np.flatnonzero(planes[:, :3].any(axis=1))
-    corner = faces[flat].ravel()
-    normals, offsets = np.repeat(planes[flat, :3], 3, axis=0), np.repeat(planes[flat, 3], 3)
-    matrix, right = np.zeros((len(points), 3, 3)), np.zeros((len(points), 3))
-    np.add.at(matrix, corner, normals[:, :, None] * normals[:, None, :])
-    np.add.at(right, corner, (offsets - np.einsum("nx,nx->n", normals, points[corner]))[:, None] * normals)
-    values, vectors = np.linalg.eigh(matrix)
-    inverse = np.divide(1.0, values, out=np.zeros_like(values), where=values > _MIN_ANGLE_EIGENVALUE)
-    step = np.einsum("vxk,vk,vyk,vy->vx", vectors, inverse, vectors, right)
-    moved = points + step
-    good = movable & (np.linalg.norm(step, axis=1) < _MAX_STEP * _shortest_edges(points, faces))
-    good[corner[np.abs(np.einsum("nx,nx->n", normals, moved[corner]) - offsets) > _SAME_PLANE]] = False
-    return np.where(good[:, None], moved, points)
+    corner, face = faces[flat].ravel(), np.repeat(flat, 3)
+    a, b, c = points[faces[face]].swapaxes(0, 1)
+    order = np.lexsort((-np.linalg.norm(np.cross(b - a, c - a), axis=1), corner))
+    bounds = np.searchsorted(corner[order], np.arange(len(points) + 1))
+    limits = np.where(movable, _MAX_STEP * _shortest_edges(points, faces), 0.0)
+    places = np.empty_like(points)
+    place_on_planes(points, planes, face[order], bounds, limits, places)
+    return places
 
 
 def _planes_of_faces(
