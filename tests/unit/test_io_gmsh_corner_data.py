@@ -1,12 +1,18 @@
 """Data at the corners of elements in Gmsh files ($ElementNodeData)."""
 
+import re
 import struct
 
 import meshio
 import numpy as np
 import pytest
 
+from anisomesh.attributes.model import Mesh
+from anisomesh.io.formats.gmsh.read import read_msh
+from anisomesh.io.formats.gmsh.write import msh_bytes
+from anisomesh.io.holding import Losses
 from anisomesh.io.meshes import load_mesh
+from anisomesh.shapes.analytic import box
 
 RNG = np.random.default_rng(0)
 POINTS = np.array([[0, 0, 0], [1, 0, 0], [1, 1, 0], [0, 1, 0], [2, 0, 0.0], [2, 1, 0], [0.5, 0, 0], [1.5, 0.5, 0]])
@@ -100,3 +106,19 @@ def test_faces_without_a_row_have_nan(tmp_path):
     elements = "2\n1 2 2 0 1 1 2 3\n5 2 2 0 1 1 3 4\n"
     path = write_text(tmp_path, elements, section("s", 1, [(5, np.arange(3.0)[:, None])], binary=False))
     np.testing.assert_array_equal(load_mesh(path).corner_data["s"], [[np.nan] * 3, [0, 1, 2]])
+
+
+def test_a_file_that_is_cut_off_in_a_section_is_refused():
+    """Data behind the cut were left out without a word, or components of theirs."""
+    surface = box(n=1)
+    rng = np.random.default_rng(1)
+    data = {"point_data": surface.n_points, "face_data": surface.n_faces, "corner_data": 3 * surface.n_faces}
+    arrays = {kind: {kind: rng.random((n, 2) if kind != "corner_data" else (n // 3, 3, 2))} for kind, n in data.items()}
+    content = msh_bytes(Mesh(surface=surface, **arrays), Losses())
+    begins = [found.start() for found in re.finditer(rb"^\$(?!End)\w", content, re.MULTILINE)]
+    ends = [found.start() for found in re.finditer(rb"^\$End\w+", content, re.MULTILINE)]
+    assert len(begins) == len(ends) >= 6
+    for begin, end in zip(begins[1:], ends[1:], strict=True):
+        for cut in {begin + 2, (begin + end) // 2, end, end + 3}:
+            with pytest.raises(ValueError, match="truncated"):
+                read_msh(content[:cut])

@@ -35,6 +35,7 @@ def read_msh(data: bytes) -> PolygonSoup:
     points in physical groups are fixed points.
     """
     version, numbers = _header(data)
+    _check_ends(data)
     is_2, carried = version.startswith("2"), Carried()
     name = b"ParametricNodes" if is_2 and b"$ParametricNodes" in data else b"Nodes"
     nodes, section = numbers.of(_section(data, name)), numbers.of(_section(data, b"Elements"))
@@ -74,6 +75,18 @@ def _header(data: bytes) -> tuple[str, NumberStream]:
         raise ValueError(f"its header reads {file_type[:10]} {size[:10]}; expected file type 0 or 1, data size 8 or 4")
     order = ">" if data[head.end() : head.end() + 4] == (1).to_bytes(4, "big") else "<"
     return version, NumberStream(b"", binary=file_type == "1", order=order, size_bytes=int(size))
+
+
+def _check_ends(data: bytes) -> None:
+    """Raise ValueError if a section begins that does not end: nothing behind it would be read."""
+    section, at = re.compile(rb"^\$(\w+)", re.MULTILINE), 0
+    while (found := section.search(data, at)) is not None:
+        name = found[1]
+        end = data.find(b"$End" + name, found.end())
+        if end < 0:
+            text = name.decode(errors="replace")
+            raise ValueError(f"truncated: its ${text} has no $End{text}")
+        at = end + len(b"$End" + name)
 
 
 def _section(data: bytes, name: bytes) -> bytes:
