@@ -261,7 +261,9 @@ class RemeshOptions:
             )
         curvature = isinstance(self.metric, str) and self.metric == "curvature"
         if (self.embedding in ("neural", "hybrid") or self.weights is not None) and not curvature:
-            raise OptionError("a network (embedding, weights) predicts the curvature metric and no other")
+            name = "embedding" if self.weights is None else "weights"
+            network = f"{name} = {str(getattr(self, name))!r}"
+            raise OptionError(f"{network} predicts the curvature metric and no other; leave it out, or the metric")
         if self.embedding == "filtered" and not curvature:
             raise OptionError("embedding 'filtered' measures the curvature metric and no other")
 

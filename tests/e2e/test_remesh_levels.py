@@ -12,7 +12,7 @@ import pytest
 
 import anisomesh
 from anisomesh import Levels, Mesh, Regions, Surface
-from anisomesh.errors import MeshFileError, OptionError
+from anisomesh.errors import MeshFileError, OptionError, TimeLimitError
 from anisomesh.io.atomic import atomic_paths
 from anisomesh.levels.files import level_paths, save_meshes
 from anisomesh.mesh.distance import surface_distance
@@ -110,6 +110,8 @@ def test_ratios_are_shares_of_the_input():
         ({"n_vertices": [100, 50, 100]}, "two levels have 100 vertices"),
         ({"ratios": [0.002, 0.003]}, "two levels have 4 vertices"),
         ({"n_vertices": [100, 50], "edge_length": 0.2}, "edge_length says how many"),
+        ({"ratios": [0.3], "max_error": 0.1}, "max_error says how many"),
+        ({"n_vertices": [100, 50], "ratio": 0.1}, "ratio says how many"),
         ({"n_vertices": [100, 20], "keep_points": np.arange(30)}, "20 vertices are asked for"),
     ],
 )
@@ -163,6 +165,11 @@ def test_a_level_that_follows_other_lines_than_the_finest_is_measured_by_itself(
 def test_every_level_has_its_share_of_the_time():
     levels = anisomesh.remesh_levels(RING, n_vertices=[300, 100], time_limit=500.0, **QUICK)
     assert not any("time limit" in text for level in levels for text in level.warnings)
+
+
+def test_a_time_limit_that_is_too_short_is_named_as_it_was_given():
+    with pytest.raises(TimeLimitError, match=r"level 0 has its share of the time limit of 0.001 s"):
+        anisomesh.remesh_levels(RING, n_vertices=[300, 100], time_limit=1e-3)
 
 
 def glb_document(path):
@@ -267,8 +274,11 @@ def test_files_are_replaced_together(tmp_path):
 def test_the_command_writes_levels_a_table_and_a_report(run_cli, torus_obj, tmp_path):
     out, report = tmp_path / "out.ply", tmp_path / "report.json"
     words = ["remesh", torus_obj, "--ratios", "0.2", "10%", "-o", out, "--report", report, "--embedding", "direct"]
+    (tmp_path / "out.lod2.ply").write_text("old")
     done = run_cli(*words, "--max-iterations", 5)
     assert done.returncode == 0, done.stderr
+    assert "out.lod2.ply and coarser levels are of an earlier run" in " ".join(done.stderr.split())
+    (tmp_path / "out.lod2.ply").unlink()
     assert sorted(path.name for path in tmp_path.iterdir()) == ["out.lod0.ply", "out.lod1.ply", "report.json"]
     facts = json.loads(report.read_text())
     assert [level["vertices"] for level in facts["levels"]] == [230, 115]
@@ -277,6 +287,14 @@ def test_the_command_writes_levels_a_table_and_a_report(run_cli, torus_obj, tmp_
     header, first, second = (line.split() for line in done.stdout.splitlines()[:3])
     assert header == ["level", "vertices", "faces", "G", "RMS", "HD", "seconds"]
     assert (first[:2], second[:2]) == (["0", "230"], ["1", "115"])
+
+
+def test_levels_in_one_file_may_replace_the_input(run_cli, tmp_path):
+    file = tmp_path / "ring.glb"
+    anisomesh.save(RING, file)
+    words = ["-n", 100, "-n", 50, "-o", file, "--embedding", "direct", "--max-iterations", 2, "--quiet"]
+    assert run_cli("remesh", file, *words).returncode == 0
+    assert anisomesh.load(file).n_points == 100
 
 
 def test_the_command_makes_names_and_replaces_only_what_is_named(run_cli, torus_obj, tmp_path):

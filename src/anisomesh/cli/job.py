@@ -82,7 +82,7 @@ class Outputs:
         if len({path.resolve() for path in self.paths}) < len(self.paths):
             raise typer.BadParameter("two outputs have the same file name; give each its own")
         for path in self.paths:
-            refuse_to_overwrite(path, *(inputs[1:] if path is self.mesh else inputs))
+            refuse_to_overwrite(path, *(inputs[1:] if path == self.mesh else inputs))
         if self.mesh_format is not None:
             check_format(self.mesh_format, "--output-format")
         elif self.mesh == STANDARD_STREAM:

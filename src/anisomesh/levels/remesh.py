@@ -11,7 +11,7 @@ from itertools import pairwise
 from typing import Any
 
 from anisomesh.counts.target import read_levels
-from anisomesh.errors import OptionError
+from anisomesh.errors import OptionError, TimeLimitError
 from anisomesh.execution.deadline import Deadline
 from anisomesh.execution.progress import OnStep, StepInfo, ignore_steps
 from anisomesh.execution.run import Run
@@ -68,6 +68,9 @@ def remesh_levels(
     the number of vertices, such as the creases that are followed and the fit, is as in a remesh with that number. The
     metric is embedded anew where it depends on that number too, at thin walls and narrow patches.
     """
+    for name in ("ratio", "max_error"):
+        if name in overrides:
+            raise OptionError(f"{name} says how many vertices one mesh has; give the levels as n_vertices or as ratios")
     options = with_overrides(RemeshOptions() if options is None else options, overrides)
     if on_step is not None and not callable(on_step):
         raise OptionError(f"on_step = {on_step!r}; expected a function of a StepInfo")
@@ -86,7 +89,10 @@ def remesh_levels(
         run = run if k == 0 else Run(run.on_step, Deadline())
         run.deadline = _deadline_of(total, run.deadline, counts[k:])
         run.on_step(StepInfo(stage="level", message=f"{k}: {n:,} vertices"))
-        level = joined_or_apart(given, cut, n, options, run, Manner(finer=None if level is None else level.finer))
+        try:
+            level = joined_or_apart(given, cut, n, options, run, Manner(finer=None if level is None else level.finer))
+        except TimeLimitError as error:
+            raise TimeLimitError(f"level {k} has its share of the time limit of {total.limit:g} s: {error}") from error
         result = replace(level.result, warnings=cut.remarks) if cut.is_all else level.result
         results.append(with_attributes(result, given, cut, options, run) if options.attributes else result)
         logger.info("level %d: %r", k, results[-1])

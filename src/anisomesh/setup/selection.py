@@ -89,6 +89,6 @@ def _remedy(mesh: Mesh) -> str:
     """Return what to select instead."""
     names = [repr(names[0]) for _, _, names in _regions(mesh)]
     if not names:
-        return "it has no regions: give it some, or a mask of faces"
+        return "it has no regions: give it some, or in Python a mask of faces"
     more = f" and {len(names) - _MAX_LISTED:,} more" if len(names) > _MAX_LISTED else ""
     return f"its regions are {', '.join(names[:_MAX_LISTED])}{more}"

@@ -84,8 +84,13 @@ class LevelOutputs(Outputs):
 
     def write(self, result: Levels, facts: dict[str, Any], display: Display) -> None:  # type: ignore[override]
         """Write the levels, all or none of them, then the other files."""
+        from anisomesh.levels.files import level_paths
+
         display.note(f"writing {', '.join(str(path) for path in self.paths)}")
         result.save(self.mesh, file_format=self.mesh_format)
+        after = level_paths(self.mesh, self.levels + 1, self.mesh_format)[-1]
+        if after not in self.paths and after.exists():
+            display.note(f"{after} and coarser levels are of an earlier run")
         if self.report is not None:
             write_json(facts, self.report)
         if self.picture is not None:
