@@ -21,7 +21,7 @@ FEW = {"lloyd_iterations": 4, "max_iterations": 15}
 
 @pytest.fixture(scope="module")
 def ring():
-    return torus(1.0, 0.3, 48, 18)
+    return torus(1.0, 0.3, 64, 24)
 
 
 @pytest.fixture(scope="module")
