@@ -5,12 +5,13 @@ import os
 import signal
 import subprocess
 import time
+from dataclasses import replace
 
 import pytest
 
 from anisomesh.bench import methods
 from anisomesh.bench.runs import read_rows, run_suite
-from anisomesh.bench.suite import parse_suite
+from anisomesh.bench.suite import load_suite, parse_suite
 from anisomesh.bench.tables import markdown, run_table, web_page
 from anisomesh.errors import AnisomeshError, OptionError
 from anisomesh.io.meshes import save
@@ -21,7 +22,7 @@ from conftest import CLI
 OURS = {"name": "ours", "method": "anisomesh", "options": {"max_iterations": 3, "embedding": "direct"}}
 TOML = """
 description = "two spheres"
-shapes = ["sphere:160", "sphere:640"]
+shapes = ["sphere:40", "sphere:160"]
 ratios = [0.5, 0.3]
 samples = 200
 methods = [{name = "ours", method = "anisomesh", options = {max_iterations = 3, embedding = "direct"}}]
@@ -40,7 +41,7 @@ def test_command_writes_rows_and_reports_and_goes_on(run_cli, tmp_path):
     assert "[4/4]" in first.stderr
     rows = [json.loads(line) for line in (tmp_path / "out/two.jsonl").read_text().splitlines()]
     assert [row["status"] for row in rows] == 4 * ["done"]
-    assert {row["asked"] for row in rows} == {max(4, round(r * n)) for r in (0.5, 0.3) for n in (162, 642)}
+    assert {row["asked"] for row in rows} == {max(4, round(r * n)) for r in (0.5, 0.3) for n in (42, 162)}
     assert all(row["evaluation"]["validity"]["closed"] for row in rows)
     page, text = (tmp_path / "out/two.html").read_text(), (tmp_path / "out/two.md").read_text()
     assert "two spheres" in page
@@ -54,7 +55,14 @@ def test_command_writes_rows_and_reports_and_goes_on(run_cli, tmp_path):
 
 
 @pytest.mark.slow
-def test_smoke_suite_runs_and_ours_are_valid_and_in_the_order_of_the_paper(run_cli, tmp_path):
+def test_smoke_suite_runs_and_ours_are_valid_and_in_the_order_of_the_paper(run_cli, tmp_path, monkeypatch):
+    given = load_suite("smoke")
+    shorter = [
+        replace(method, options={**method.options, "max_iterations": 15}) if method.method == "anisomesh" else method
+        for method in given.methods
+    ]
+    smaller = replace(given, shapes=("part:300", "ring:300"), methods=tuple(shorter))  # half the points
+    monkeypatch.setattr("anisomesh.bench.suite.load_suite", {"smoke": smaller}.get)
     done = run_cli("benchmark", "smoke", "-o", tmp_path, "--quiet")
     assert done.returncode == 0, done.stderr
     rows = read_rows(tmp_path / "smoke.jsonl")
@@ -238,7 +246,7 @@ def test_a_suite_trains_the_networks_that_it_compares(tmp_path, item_folder):
     paper = {"epochs": 1, "paper": {"channels": 8, "levels": 2}}
     neural = {"method": "anisomesh", "options": {"embedding": "neural", "max_iterations": 3}}
     ours, theirs = ({"name": n, **neural, "training": t} for n, t in (("ours 1", training), ("theirs", paper)))
-    wanted = suite(shapes=["ring:300"], methods=[ours, theirs])
+    wanted = suite(shapes=["ring:100"], methods=[ours, theirs])
     with pytest.raises(OptionError, match="name a data set with --items"):
         run_suite(wanted, tmp_path / "rows.jsonl")
     told, steps = [], []
@@ -254,7 +262,7 @@ def test_a_suite_trains_the_networks_that_it_compares(tmp_path, item_folder):
     run_suite(wanted, tmp_path / "rows.jsonl", on_row=steps.append)
     assert not steps
     told.clear()
-    changed = suite(shapes=["ring:300"], methods=[ours, {**theirs, "training": {**paper, "rate": 1e-3}}])
+    changed = suite(shapes=["ring:100"], methods=[ours, {**theirs, "training": {**paper, "rate": 1e-3}}])
     run_suite(changed, tmp_path / "rows.jsonl", items=item_folder, on_row=steps.append, on_epoch=told.append)
     assert [text.split(",")[0] for text in told] == ["theirs: epoch 1 of 1"]  # and not a refusal to go on
     assert [step.row["method"] for step in steps] == ["theirs"]

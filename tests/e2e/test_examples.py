@@ -2,26 +2,49 @@
 
 import importlib.util
 import sys
+from functools import partial
 from pathlib import Path
 
 import numpy as np
 import pytest
 
+import anisomesh
+from anisomesh.shapes import analytic
+
 FOLDER = Path(__file__).parents[2] / "examples"
+COARSE = {
+    "sphere": partial(analytic.sphere, 3),
+    "knot": partial(analytic.trefoil_knot, n_along=150, n_around=12),
+    "torus": partial(analytic.torus, n_major=48, n_minor=16),
+    "ring": partial(analytic.twisted_ring, n_major=110),
+}
+
+
+@pytest.fixture(autouse=True)
+def coarse_samples(monkeypatch):
+    """Give the examples samples of fewer points, to which the time of a remesh is proportional."""
+    for name, make in COARSE.items():
+        monkeypatch.setitem(analytic.SAMPLES, name, make)
 
 
 def example(name):
+    """Return an example as a module, whose pictures have a quarter of the pixels."""
     spec = importlib.util.spec_from_file_location(f"example_{name}", FOLDER / f"{name}.py")
     module = importlib.util.module_from_spec(spec)
     sys.modules[spec.name] = module  # where dataclasses look for names in annotations
     spec.loader.exec_module(module)
+    if hasattr(module, "PictureOptions"):
+        options = module.PictureOptions
+        module.PictureOptions = lambda **given: options(**given | {"scale": 1})
     return module
 
 
 @pytest.fixture(scope="module")
 def stretch_along_z():
     """The result of the example with a metric of one's own."""
-    return example("own_metric").main(n_vertices=300)
+    module = example("own_metric")
+    module.cylinder = partial(module.cylinder, around=48, along=30)
+    return module.main(n_vertices=200)
 
 
 def test_every_example_is_tested():
@@ -45,7 +68,7 @@ def test_compiled_functions_of_examples_are_not_cached():
 
 @pytest.mark.slow
 def test_remesh_a_surface(tmp_path, capsys, torus_obj):
-    result = example("remesh_a_surface").main(torus_obj, tmp_path, n_vertices=200)
+    result = example("remesh_a_surface").main(torus_obj, tmp_path, n_vertices=100)
     assert {path.name for path in tmp_path.iterdir()} == {"remeshed.ply", "remeshed.png"}
     assert f"1,152 -> {result.surface.n_points:,} vertices" in capsys.readouterr().out
 
@@ -67,16 +90,18 @@ def test_own_metric_keeps_the_open_cylinder(stretch_along_z):
 def test_gallery_draws_the_results(tmp_path, capsys):
     from PIL import Image
 
-    example("gallery").main(str(tmp_path / "three.png"), n_vertices=200)
+    module = example("gallery")
+    module.trefoil_knot = lambda **sizes: analytic.trefoil_knot(**sizes | {"n_along": 120, "n_around": 12})
+    module.main(str(tmp_path / "three.png"), n_vertices=150)
     with Image.open(tmp_path / "three.png") as image:
-        assert image.width == 2 * 3 * 480
+        assert image.width == 3 * 480
     assert "three.png" in capsys.readouterr().out
 
 
 @pytest.mark.slow
-def test_noisy_scan_is_better_with_the_network(tmp_path, capsys):
-    pytest.importorskip("torch")
-    example("noisy_scan").main(str(tmp_path / "noisy.png"), n_vertices=700)
+def test_noisy_scan_is_better_with_the_network(tmp_path, capsys, monkeypatch):
+    monkeypatch.setattr("anisomesh.remesh", partial(anisomesh.remesh, max_iterations=15))
+    example("noisy_scan").main(str(tmp_path / "noisy.png"), n_vertices=400)
     assert (tmp_path / "noisy.png").stat().st_size > 10_000
     direct, hybrid = (
         [float(word) for word in line.replace("e-4", "").replace(",", "").split() if word.replace(".", "").isdigit()]
@@ -88,7 +113,7 @@ def test_noisy_scan_is_better_with_the_network(tmp_path, capsys):
 
 @pytest.mark.slow
 def test_own_metric_source_stretches_triangles_around_the_axis(tmp_path):
-    plain, around, curvature = example("own_metric_source").main(str(tmp_path / "source.png"), n_vertices=300)
+    plain, around, curvature = example("own_metric_source").main(str(tmp_path / "source.png"), n_vertices=200)
     assert plain.embedding.stretch.achieved_mean == pytest.approx(1.0, abs=1e-6)
     assert around.embedding.stretch.achieved_mean > 3.0
     assert curvature.embedding_name == "direct"
@@ -101,7 +126,7 @@ def test_own_metric_source_stretches_triangles_around_the_axis(tmp_path):
 
 @pytest.mark.slow
 def test_own_energy_makes_flat_triangles(tmp_path):
-    plain, layered = example("own_energy").main(str(tmp_path / "energy.png"), n_vertices=200)
+    plain, layered = example("own_energy").main(str(tmp_path / "energy.png"), n_vertices=100)
     heights = [np.abs(np.diff(r.surface.points[r.surface.edges], axis=1)[:, 0, 2]).mean() for r in (plain, layered)]
     assert heights[1] < 0.8 * heights[0]
     assert plain.validity.closed
@@ -111,7 +136,7 @@ def test_own_energy_makes_flat_triangles(tmp_path):
 
 @pytest.mark.slow
 def test_own_embedder_is_worse_in_the_metric_than_the_direct_one(tmp_path, capsys):
-    results = example("own_embedder").main(str(tmp_path / "embedder.png"), n_vertices=200)
+    results = example("own_embedder").main(str(tmp_path / "embedder.png"), n_vertices=150)
     assert [result.embedding.points.shape[1] for result in results] == [6, 6, 8]
     quality = [float(line.split("G ")[1].split()[0]) for line in capsys.readouterr().out.splitlines()]
     assert quality[2] == max(quality)
@@ -119,8 +144,8 @@ def test_own_embedder_is_worse_in_the_metric_than_the_direct_one(tmp_path, capsy
 
 @pytest.mark.slow
 def test_stages_make_a_valid_mesh_step_by_step(tmp_path, capsys):
-    result = example("stages").main(str(tmp_path / "stages.png"), n_vertices=300)
-    assert result.n_points == 300
+    result = example("stages").main(str(tmp_path / "stages.png"), n_vertices=150)
+    assert result.n_points == 150
     words = [line.split(":")[0] for line in capsys.readouterr().out.splitlines()]
     assert words == ["prepared", "metric", "embedding", "features", "sites", "dual", "fitted"]
     assert (tmp_path / "stages.png").stat().st_size > 10_000
@@ -129,7 +154,7 @@ def test_stages_make_a_valid_mesh_step_by_step(tmp_path, capsys):
 @pytest.mark.slow
 def test_learn_a_metric_finds_the_stretch_of_the_given_mesh(tmp_path, capsys):
     pytest.importorskip("torch")
-    losses = example("learn_a_metric").main(str(tmp_path / "learned.png"), n_given=250, n_vertices=300, steps=50)
+    losses = example("learn_a_metric").main(str(tmp_path / "learned.png"), n_given=200, n_vertices=200, steps=40)
     assert losses[-1] < 1.1 < 1.25 < losses[0]
     lines = capsys.readouterr().out.splitlines()
     before, after = (float(line.split()[0]) for line in lines[1].split("factor of ")[1].split("before,"))
@@ -149,10 +174,10 @@ def test_carry_data_loses_nothing(capsys):
 
 @pytest.mark.slow
 def test_adapting_to_a_solution_lowers_its_error_at_the_same_number_of_vertices(tmp_path, capsys):
-    even, *adapted = example("adapt_to_a_solution").main(str(tmp_path / "adapted.png"), n_vertices=400)
+    even, *adapted = example("adapt_to_a_solution").main(str(tmp_path / "adapted.png"), n_vertices=250)
     assert adapted[0] < even / 2.5
     assert adapted[1] < even / 4
-    assert capsys.readouterr().out.count("400 vertices") == 3
+    assert capsys.readouterr().out.count("250 vertices") == 3
     assert (tmp_path / "adapted.png").stat().st_size > 10_000
 
 

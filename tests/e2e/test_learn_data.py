@@ -22,7 +22,7 @@ from anisomesh.learn.data.sources import sources_of
 from anisomesh.pipeline import remesh
 from anisomesh.shapes.analytic import ellipsoid, sphere, torus
 
-RECIPE = Recipe(target=200, variants=("decimated",))
+RECIPE = Recipe(target=100, variants=("decimated",))
 
 
 @pytest.fixture
@@ -54,13 +54,13 @@ def in_this_process(monkeypatch):
 
 @pytest.mark.slow
 def test_a_build_keeps_drops_and_lists_and_a_second_one_does_nothing(folder, tmp_path, monkeypatch):
-    """The first three sources, one of each status, get processes of their own; the others are made in this one."""
+    """A source that is kept and one that fails get processes of their own; the others are made in this one."""
     out, calls = tmp_path / "out", []
-    recipe = Recipe(target=200, variants=("decimated",), min_stretch=1.2)
+    recipe = Recipe(target=100, variants=("decimated",), min_stretch=1.2)
     sources = sources_of(folder, 1)
-    three = [source for source in sources if source.name in {"egg", "ball", "bad"}]
-    first = build(three, out, recipe, remesh, workers=2, on_row=lambda *step: calls.append(step))
-    assert sorted(number for _, number, _ in calls) == [1, 2, 3]
+    two = [source for source in sources if source.name in {"egg", "bad"}]
+    first = build(two, out, recipe, remesh, workers=2, on_row=lambda *step: calls.append(step))
+    assert sorted(number for _, number, _ in calls) == [1, 2]
     monkeypatch.setattr("anisomesh.learn.data.build.isolated", lambda work: work)
     rows = build(sources, out, recipe, remesh, workers=1, on_row=lambda *step: calls.append(step))
     assert all(row in rows for row in first)
@@ -75,7 +75,7 @@ def test_a_build_keeps_drops_and_lists_and_a_second_one_does_nothing(folder, tmp
         for entry in row.get("items", []):
             item = load_item(out / entry["file"])
             assert len(item.points) == entry["points"]
-    assert sorted(number for _, number, _ in calls) == [1, 1, 2, 2, 3, 3]
+    assert sorted(number for _, number, _ in calls) == [1, 1, 2, 2, 3, 4]
     calls.clear()
     again = build(sources, out, recipe, remesh, workers=1, on_row=lambda *step: calls.append(step))
     assert (again, calls) == (rows, [])
@@ -93,7 +93,7 @@ def test_a_build_that_was_killed_goes_on(in_this_process, folder, tmp_path):
         "from anisomesh.learn.data.sources import sources_of; from anisomesh.pipeline import remesh\n"
         "from anisomesh.learn.data.recipe import Recipe\n"
         f"if __name__ == '__main__': build(sources_of(Path({str(folder)!r}), 0), Path({str(out)!r}), "
-        "Recipe(target=200, variants=('decimated',)), remesh, workers=1)"
+        "Recipe(target=100, variants=('decimated',)), remesh, workers=1)"
     )
     script = tmp_path / "run.py"
     script.write_text(code)
@@ -119,7 +119,7 @@ def test_a_build_that_was_killed_goes_on(in_this_process, folder, tmp_path):
 
 @pytest.mark.slow
 def test_the_manifest_has_the_requested_sources_and_their_current_families(in_this_process, folder, tmp_path):
-    out, recipe = tmp_path / "out", Recipe(target=200, variants=())
+    out, recipe = tmp_path / "out", Recipe(target=100, variants=())
     build(sources_of(folder, 2), out, recipe, remesh, workers=1)
     (folder / "odd.ply").mkdir()  # no mesh, in spite of its name
     files = [path.relative_to(folder).as_posix() for path in sorted(folder.rglob("*.ply")) if path.is_file()]
@@ -165,7 +165,7 @@ def test_wrong_folders_and_lists_are_refused(tmp_path):
 
 @pytest.mark.slow
 def test_the_command_builds_and_tells(in_this_process, run_cli, folder, tmp_path):
-    words = ("dataset", "build", folder, tmp_path / "out", "--target", 200, "--blobs", 1, "--parts", 1, "--no-variants")
+    words = ("dataset", "build", folder, tmp_path / "out", "--target", 100, "--blobs", 1, "--parts", 1, "--no-variants")
     done = run_cli(*words, "--workers", 1)
     assert done.returncode == 0, done.stderr
     assert "bad" in done.stderr

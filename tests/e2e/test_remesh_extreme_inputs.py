@@ -86,7 +86,7 @@ VALID = {
     "box of twelve faces": (lambda: (box(n=1).points, box(n=1).faces), 8),
     "needle": (
         lambda: (np.array([[0, 0, 0], [1, 0, 0], [0.5, 1e-9, 0], [0.5, 0, 1e-9]]), TETRAHEDRON),
-        50,
+        20,
     ),
 }
 

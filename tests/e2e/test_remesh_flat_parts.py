@@ -39,7 +39,7 @@ PARTS = {
 def test_corners_and_planes_are_exact_and_creases_covered(name, seed):
     make, n = PARTS[name]
     part = make()
-    result = anisomesh.remesh(part, n_vertices=n, seed=seed, max_iterations=50)
+    result = anisomesh.remesh(part, n_vertices=n, seed=seed, max_iterations=20)
     new, size = result.surface, part.diagonal
     sharp = sharp_edges(part, 40.0)
     at_corner = part.points[corners(part, sharp)]
@@ -61,7 +61,7 @@ def test_corners_and_planes_are_exact_and_creases_covered(name, seed):
 @pytest.mark.parametrize("name", ["gear", "screw", "washer stack"])
 def test_round_creases_of_sparse_parts_are_covered_by_chords(name):
     part = sparse_parts()[name]
-    result = anisomesh.remesh(part, n_vertices=300, max_iterations=50)
+    result = anisomesh.remesh(part, n_vertices=300, max_iterations=20)
     kept = feature_preservation(
         part, result.surface, crease_angle=40.0, tolerance=0.1 * result.surface.edge_lengths.mean()
     )
@@ -72,7 +72,7 @@ def test_round_creases_of_sparse_parts_are_covered_by_chords(name):
 
 def test_triangles_on_flat_faces_do_not_take_after_the_slivers_of_the_input():
     part = thick_comb(300, bulge=0.2)
-    result = anisomesh.remesh(part, n_vertices=300, embedding="direct", max_iterations=50)
+    result = anisomesh.remesh(part, n_vertices=300, embedding="direct", max_iterations=20)
     new = result.surface
     quality = anisotropic_quality(new.points, new.faces, np.tile(np.eye(3), (new.n_points, 1, 1)))
     on_top = (np.abs(new.points[new.faces][:, :, 2] - 0.1) < 1e-9 * part.diagonal).all(axis=1)

@@ -151,8 +151,8 @@ THIN = [
     (wavy_shell(1e-3), 800, 2e-3),
 ]
 THIN_AND_FINE = [
-    pytest.param(plate(1e-3), 2_000, 1e-3, marks=pytest.mark.slow),
-    pytest.param(wavy_shell(1e-3), 3_000, 2e-3, marks=pytest.mark.slow),
+    pytest.param(plate(1e-3), 1_200, 1e-3, marks=pytest.mark.slow),
+    pytest.param(wavy_shell(1e-3), 2_000, 2e-3, marks=pytest.mark.slow),
 ]
 
 
@@ -169,7 +169,7 @@ def test_thin_plates_and_shells_keep_their_outline(shape, n, tolerance):
 
 def assert_outline_is_kept(shape, n, tolerance, metric):
     """Regression: the two creases of the rim shared their vertices, and the outline was cut by up to 2 %."""
-    result = anisomesh.remesh(shape, n_vertices=n, metric=metric, embedding="direct")
+    result = anisomesh.remesh(shape, n_vertices=n, metric=metric, embedding="direct", max_iterations=20)
     assert result.surface.n_points == n
     assert result.warnings == ()
     assert result.surface.area == pytest.approx(shape.area, rel=2e-3)
