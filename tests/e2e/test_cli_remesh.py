@@ -92,7 +92,9 @@ def test_progress_goes_to_standard_error_in_plain_lines(run_with_everything):
 @pytest.mark.slow
 def test_the_result_depends_on_the_seed_and_not_on_the_threads(run_cli, torus_obj, tmp_path):
     def points(name, *words):
-        process = run_cli("remesh", torus_obj, "-o", tmp_path / name, "-n", 100, "--max-iterations", 10, "--quiet", *words)
+        process = run_cli(
+            "remesh", torus_obj, "-o", tmp_path / name, "-n", 100, "--max-iterations", 10, "--quiet", *words
+        )
         assert (process.returncode, process.stdout, process.stderr) == (0, "", "")
         return (tmp_path / name).read_bytes()
 
@@ -102,7 +104,9 @@ def test_the_result_depends_on_the_seed_and_not_on_the_threads(run_cli, torus_ob
 
 
 def test_summary_names_size_and_files(run_cli, torus_obj, tmp_path):
-    process = run_cli("remesh", torus_obj, "-o", "out.obj", "-n", 200, "--metric", "uniform", "--max-iterations", 5, cwd=tmp_path)
+    process = run_cli(
+        "remesh", torus_obj, "-o", "out.obj", "-n", 200, "--metric", "uniform", "--max-iterations", 5, cwd=tmp_path
+    )
     assert process.returncode == 0
     count = len(read(tmp_path / "out.obj").vertices)
     assert f"{count:,} (asked for 200)" in process.stdout
