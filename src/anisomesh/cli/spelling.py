@@ -18,10 +18,10 @@ _SPELLINGS = {
     if name not in _PYTHON_ONLY
 }
 _UNMISTAKABLE = "|".join(name for name in _SPELLINGS if "_" in name or name == "ratio")
-_WORDS = "|".join(name for name in _SPELLINGS if not re.fullmatch(_UNMISTAKABLE, name))
+_ENGLISH = "|".join(name for name in _SPELLINGS if not re.fullmatch(_UNMISTAKABLE, name))
 _NAME = re.compile(
     rf"(?<![\w./\\'\"-])({_UNMISTAKABLE})(?!\w|[./\\'\"-]\w)"  # not in file names and quotations
-    rf"|(?:(?<=^)|(?<=: ))({_WORDS})(?=\[| = | has \d| ['\d])"  # in front of a value: they are words of English
+    rf"|(?:(?<=^)|(?<=: ))({_ENGLISH})(?=\[| = | has \d| ['\d])"  # in front of a value: they are words of English
 )
 
 
