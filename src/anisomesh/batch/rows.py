@@ -20,7 +20,7 @@ _WHAT = "row of a batch"
 
 
 class Results:
-    """The rows in a folder: those of its own file, and of the files of other shards of the same batch.
+    """The rows in a folder: its own file, and the files of other shards of the same batch.
 
     Parameters
     ----------

@@ -50,7 +50,7 @@ def command(
         typer.Option(metavar="FILE", help="Jobs with options of their own: .jsonl, or .csv with a heading."),
     ] = None,
     results: Annotated[
-        Path | None, typer.Option(metavar="DIR", help="Folder of the results, if it is not that of the meshes.")
+        Path | None, typer.Option(metavar="DIR", help="Folder of the results, if the meshes go elsewhere.")
     ] = None,
     n_vertices: Vertices = None,
     ratio: Ratio = None,
