@@ -305,3 +305,16 @@ def test_reading_the_surface_alone_says_nothing_of_attributes(tmp_path, caplog):
     caplog.set_level(logging.WARNING)
     assert load_mesh(tmp_path / "a.obj").is_bare
     assert re.search("left out texture coordinates: a face refers to vt 9 of 1", caplog.text)
+
+
+@pytest.mark.parametrize("suffix", [".vtu", ".vtp"])
+def test_faces_in_one_region_0_keep_it_beside_regions_of_points_of_the_same_name(suffix):
+    mesh = Mesh(
+        surface=formats.SURFACE,
+        regions={"physical": Regions(np.zeros(formats.N_FACES, dtype=np.int64))},
+        fixed_points=np.array([0, 1, 3]),
+        fixed_point_regions={"physical": Regions(np.array([1, 1, 0]))},
+    )
+    read, _ = formats.round_trip(mesh, suffix)
+    assert not read.regions["physical"].labels.any()
+    assert read.fixed_point_regions["physical"].labels.tolist() == [1, 1, 0]

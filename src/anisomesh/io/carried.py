@@ -132,7 +132,7 @@ class Carried:
         """Add data of cells among which are lines and fixed points, as data of faces and as divisions of each.
 
         ``names`` are the ones of regions of points, lines and faces, None where none are given. What is a division of
-        points or lines, and 0 without a name elsewhere, is not added to the faces.
+        points or lines, and 0 elsewhere, is not added to the faces unless they have a list of names, if an empty one.
         """
         elsewhere = np.ones(len(values), dtype=bool)
         found = False
@@ -142,7 +142,7 @@ class Carried:
             if _is_division(name, values[cells], own):
                 marked.divide(name, values, own)
                 found |= name in marked.divisions
-        if not found or values[elsewhere].any() or 0 in (names[_SURFACE] or {}):
+        if not found or values[elsewhere].any() or names[_SURFACE] is not None:
             self.add_cell_data(name, values, names=names[_SURFACE])
 
     def take_corners(self, rows: Array) -> None:
