@@ -93,7 +93,7 @@ def test_names_without_a_mesh_are_errors(meshes, name):
 def test_faults_of_jobs_are_found_before_any_work(meshes, tmp_path):
     a, b = str(meshes / "a.obj"), str(meshes / "b.obj")
     for wrong, message in [
-        ([], "no mesh to remesh"),
+        ([], "no meshes were given"),
         (
             [Job(input=a, output="x.ply", options=TARGET), Job(input=b, output="./x.ply", options=TARGET)],
             "both be writ",
@@ -205,11 +205,11 @@ def test_both_kinds_of_manifest_say_the_same(meshes, tmp_path):
     [
         ("a.csv", "input,vertexes\na.obj,3\n", "line 2: unknown key 'vertexes'"),
         ("a.csv", "input,ratio\na.obj\n", "line 2: expected 2 columns"),
-        ("a.csv", "output\na.ply\n", "line 2: there is no input"),
-        ("a.csv", "input\n", "there is no row"),
+        ("a.csv", "output\na.ply\n", "line 2: input is missing"),
+        ("a.csv", "input\n", "the table is empty"),
         ("a.jsonl", '{"input": "a.obj"}\n{"input": "b.ob', "line 2: not JSON"),
         ("a.jsonl", '["a.obj"]\n', "line 1: expected an object"),
-        ("a.jsonl", '{"input": 3}\n', "line 1: there is no input"),
+        ("a.jsonl", '{"input": 3}\n', "line 1: input is missing"),
         ("a.txt", "a.obj\n", "ending in .jsonl or .csv"),
         ("a.csv", None, "no such file"),
     ],

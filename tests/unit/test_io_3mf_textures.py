@@ -73,7 +73,7 @@ def test_textures_stand_beside_colours_and_materials_of_other_faces(tmp_path, ca
     [
         (textured(regions={"material": Regions(LABELS + 1)}), f"the materials of {2 * N // 3} face(s) that have a tex"),
         (textured(corner_data={"color": np.zeros((N, 3, 3), np.uint8)}), f"the colours of {2 * N // 3} face(s)"),
-        (textured(textures={1: TEXTURES[1]}), "the texture 'stone.jpg', of which there is no image"),
+        (textured(textures={1: TEXTURES[1]}), "the texture 'stone.jpg', whose image is missing"),
         (textured(textures={1: {"data": b"GIF89a"}, 2: 3}), "corner data 'uv'; materials 'textures'"),
         (textured({1: "wood.png", 2: "my / stone"}), "some characters of 1 name(s) such as 'my / stone'"),
         (Mesh(surface=BOX, corner_data={"uv": UV}, materials={"textures": TEXTURES}), "corner data 'uv'; materials"),

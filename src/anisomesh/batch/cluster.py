@@ -74,7 +74,7 @@ def run_on_cluster(
 
 
 class _Dispatcher:
-    """Gives tasks to the workers of a client that are free, among those that ``known`` returns if it is given."""
+    """Gives tasks to the workers of a client that are free; with ``known``, only to the ones that it returns."""
 
     def __init__(self, client: Any, work: Work, known: Callable[[], set[str]] | None) -> None:
         self._client = client

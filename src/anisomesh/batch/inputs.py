@@ -69,7 +69,7 @@ def _meshes(name: str, without: Path | None) -> list[tuple[str, str]]:
     meshes = [p for p in paths if p.suffix.lower() in MESH_FORMATS and p.is_file() and not _is_hidden(p, base)]
     meshes = [p for p in meshes if hidden is None or hidden not in p.resolve().parents]
     if not meshes:
-        raise OptionError(f"{name}: there is no mesh; expected files ending in {', '.join(sorted(MESH_FORMATS))}")
+        raise OptionError(f"{name}: no meshes found; expected files ending in {', '.join(sorted(MESH_FORMATS))}")
     return [(str(p), p.relative_to(base).as_posix()) for p in meshes]
 
 
@@ -80,7 +80,7 @@ def _addresses(name: str) -> list[tuple[str, str]]:
     base = name.partition("*")[0].rpartition("/")[0] if "*" in name else name.rstrip("/")
     meshes = [file for file in files if suffix_of(file) in MESH_FORMATS]
     if not meshes:
-        raise OptionError(f"{name}: there is no mesh; expected files ending in {', '.join(sorted(MESH_FORMATS))}")
+        raise OptionError(f"{name}: no meshes found; expected files ending in {', '.join(sorted(MESH_FORMATS))}")
     return [(file, file.removeprefix(base).lstrip("/")) for file in meshes]
 
 

@@ -61,7 +61,7 @@ def checked(jobs: Sequence[Job], folder: str) -> list[Job]:
         unknown, or two jobs write the same file, or one writes the input of any.
     """
     if not jobs:
-        raise OptionError("there is no mesh to remesh; name files, folders or a manifest")
+        raise OptionError("no meshes were given; name files, folders or a manifest")
     found = [_in_one_form(job) for job in jobs]
     missing = [path for job in found for path in job.files.values() if not is_address(path) and not exists(path)]
     if missing:

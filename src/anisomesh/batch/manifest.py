@@ -54,7 +54,7 @@ def read_manifest(path: Path, options: Options, *, output_format: str | None = N
         check_keys(where, row, _KNOWN_COLUMNS)
         jobs.append(_job(where, row, options, path.parent, output_format))
     if not jobs:
-        raise OptionError(f"{path}: there is no row; expected one for each mesh")
+        raise OptionError(f"{path}: the table is empty; expected one for each mesh")
     return jobs
 
 
@@ -62,7 +62,7 @@ def _job(where: str, row: dict[str, Any], options: Options, folder: Path, output
     given = {name: value for name, value in row.items() if value not in (None, "")}
     source, output = given.pop("input", None), given.pop("output", None)
     if not isinstance(source, str):
-        raise OptionError(f"{where}: there is no input; expected the name of a mesh in the column input")
+        raise OptionError(f"{where}: input is missing; expected the name of a mesh in the column input")
     if output is not None and not isinstance(output, str):
         raise OptionError(f"{where}: output = {output!r}; expected the name of a file")
     if output is None:

@@ -13,7 +13,7 @@ from anisomesh.voronoi.restricted import RestrictedVoronoi
 
 _FREE_DISTANCE = 2.0  # spacings of the sites that are left, from which on a neighbour costs nothing; Yuksel 2015
 _POWER = 8  # of the price; the same
-_NEIGHBOURS = 4.0  # neighbours looked at for each site that one of those left stands for, beside a few; heuristic
+_NEIGHBOURS = 4.0  # neighbours looked at for each site that a remaining one stands for, beside a few; heuristic
 _LEAST_NEIGHBOURS = 8
 _SETTLING_STEPS = 2  # of Lloyd's algorithm before the energy is known well enough; heuristic
 _LEAST_SHARE, _LEAST_AREA = 0.05, 1e-6  # of the mean, for cells that have no energy or no area; heuristics
@@ -34,7 +34,7 @@ def spread_subset(voronoi: RestrictedVoronoi, sites: Sites, n: int, energy: Ener
     n
         How many are left, at most S.
     energy
-        If given, they are denser where cells of so many sites have more of this energy for their size, as in
+        If given, they are denser where cells of that many sites have more of this energy for their size, as in
         :func:`~anisomesh.cvt.sampling.resample_by_energy`; else where the sites are denser.
 
     Notes

@@ -43,7 +43,7 @@ def remesh_levels(
     n_vertices
         Vertices of each level, at least 4, no two the same, in any order.
     ratios
-        Instead of ``n_vertices``: vertices as shares of those of the prepared input, such as ``[1, 0.5, 0.2, 0.05]``.
+        Instead of ``n_vertices``: shares of the vertices of the prepared input, such as ``[1, 0.5, 0.2, 0.05]``.
     options
         See :class:`RemeshOptions`; keyword arguments of the same names take precedence. The time limit is for all
         levels together; an ``edge_length`` is not possible.

@@ -149,7 +149,7 @@ def set_up(
 def _start(finer: Finer, task: MeshingTask, options: RemeshOptions) -> Sites | None:
     """Return as many sites (n, d) of a finer mesh as a task takes, in its embedding; None if there are too few.
 
-    On measured surfaces they are denser where so many sites have more energy. On designed ones that says too little:
+    On measured surfaces they are denser where that many sites have more energy. On designed ones that says too little:
     cells across a crease have nearly all of the energy until their sites are on it.
     """
     sites, own, embedded = finer.sites, finer.tasks.dual.voronoi.embedded, task.voronoi.embedded

@@ -62,7 +62,7 @@ def textured(mesh: Mesh, first: int, losses: Losses) -> Textured | None:
     Returns
     -------
     Textured or None
-        None if there is no image, no division or no pair of texture coordinates at each corner or point.
+        None if images, regions or texture coordinates are missing.
     """
     division, given = mesh.regions.get(TEXTURE), mesh.materials.get(TEXTURES)
     uv = _coordinates(mesh)
@@ -76,7 +76,7 @@ def textured(mesh: Mesh, first: int, losses: Losses) -> Textured | None:
         chosen = np.flatnonzero(division.labels == label)
         if label not in tables:
             if label != 0 or label in division.names:
-                losses.say(f"the texture {texts[label]!r}, of which there is no image")
+                losses.say(f"the texture {texts[label]!r}, whose image is missing")
             continue
         part, kind = f"{_FOLDER}/{texts[label]}", _kind(tables[label])
         images[part] = kind, bytes(tables[label]["data"])
