@@ -265,7 +265,7 @@ def _remesh(cut: Cut, n: int, options: RemeshOptions, run: Run, manner: Manner) 
         ),
         feature_distance=made.feature_distance * frame.scale,
     )
-    return RemeshedLevel(result, Finer(tasks, optimised.sites))
+    return RemeshedLevel(result, Finer(tasks, optimised))
 
 
 def _said_of_mesh(made: MadeMesh, tasks: Tasks) -> tuple[str, ...]:

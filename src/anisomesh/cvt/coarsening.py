@@ -6,7 +6,7 @@ import numpy as np
 import numpy.typing as npt
 from scipy.spatial import cKDTree
 
-from anisomesh._arrays import Floats, Sites
+from anisomesh._arrays import Floats, Sites, SiteScalars
 from anisomesh.cvt.energy import Energy, evaluate_energy
 from anisomesh.cvt.lloyd import lloyd
 from anisomesh.voronoi.restricted import RestrictedVoronoi
@@ -22,7 +22,13 @@ _MAX_SHARE = 0.2  # of the sites that go at once, so that the price of the other
 Ints = npt.NDArray[np.int64]
 
 
-def spread_subset(voronoi: RestrictedVoronoi, sites: Sites, n: int, energy: Energy | None = None) -> Sites:
+def spread_subset(
+    voronoi: RestrictedVoronoi,
+    sites: Sites,
+    n: int,
+    energy: Energy | None = None,
+    mass: SiteScalars | None = None,
+) -> Sites:
     """Return n of some sites (n, d), spread evenly in proportion to the distances that they should have.
 
     Parameters
@@ -36,6 +42,8 @@ def spread_subset(voronoi: RestrictedVoronoi, sites: Sites, n: int, energy: Ener
     energy
         If given, they are denser where cells of that many sites have more of this energy for their size, as in
         :func:`~anisomesh.cvt.sampling.resample_by_energy`; else where the sites are denser.
+    mass
+        Masses of the cells (S,) of the sites, if they are known.
 
     Notes
     -----
@@ -49,7 +57,8 @@ def spread_subset(voronoi: RestrictedVoronoi, sites: Sites, n: int, energy: Ener
     """
     if n >= len(sites):
         return sites
-    chosen = sites[_eliminated(sites, _spacings(voronoi.integrate(sites).mass, n / len(sites)), n)]
+    mass = voronoi.integrate(sites).mass if mass is None else mass
+    chosen = sites[_eliminated(sites, _spacings(mass, n / len(sites)), n)]
     if energy is None:
         return chosen
     chosen = lloyd(voronoi, chosen, _SETTLING_STEPS)

@@ -10,7 +10,7 @@ from enum import StrEnum
 import numpy as np
 import numpy.typing as npt
 
-from anisomesh._arrays import PointTensors, Sites
+from anisomesh._arrays import PointTensors, Sites, SiteScalars
 from anisomesh.cvt.energy import Energy, evaluate_energy, inverse_blocks
 from anisomesh.cvt.lloyd import OnIteration, divide_rows
 from anisomesh.execution.deadline import NO_DEADLINE, Deadline
@@ -38,8 +38,8 @@ class Optimised:
     ----------
     sites
         Positions (S, d).
-    energy
-        Their energy.
+    energy, mass
+        Their energy, and the mass of each cell (S,).
     iterations, evaluations
         Numbers of iterations, and of evaluations of the energy.
     status
@@ -48,6 +48,7 @@ class Optimised:
 
     sites: Sites
     energy: float
+    mass: SiteScalars
     iterations: int
     evaluations: int
     status: Status
@@ -151,7 +152,14 @@ def minimise(
         sites, here, iteration = sites + step * direction, there, iteration + 1
         if on_iteration is not None:
             on_iteration(iteration, here.value)
-    return Optimised(sites=sites, energy=here.value, iterations=iteration, evaluations=evaluations, status=status)
+    return Optimised(
+        sites=sites,
+        energy=here.value,
+        mass=here.mass,
+        iterations=iteration,
+        evaluations=evaluations,
+        status=status,
+    )
 
 
 class _InverseHessian:

@@ -16,7 +16,7 @@ from anisomesh.delaunay.placement import place_vertices
 from anisomesh.delaunay.topology_control import ControlledCells, control_topology
 from anisomesh.execution.deadline import NO_DEADLINE, Deadline
 from anisomesh.features.network import FeatureNetwork
-from anisomesh.mesh.closest_points import ClosestPoints
+from anisomesh.mesh.closest_points import ClosestPoints, SearchTrees
 from anisomesh.mesh.surface import Surface
 from anisomesh.mesh.validity import faulty_faces
 from anisomesh.meshops.anchoring.anchored import anchored
@@ -52,8 +52,7 @@ class MeshingTask:
     features
         Boundary and creases of the surface.
     surface
-        The surface to mesh, against which faults are counted; the embedded one may differ by a tolerance. It is
-        coarsened if the sites are too few for its topology.
+        The surface to mesh, against which faults are counted; the embedded one may differ by a tolerance.
     tensors
         The metric at the points of the embedded surface (V, 3, 3).
     n_vertices
@@ -64,6 +63,8 @@ class MeshingTask:
         Weights (V,) of squared distances, by which points that the dual misses are found; None for 1 everywhere.
     anchors
         Where the mesh has vertices, and edges of its boundary, in any case.
+    trees
+        Search trees, shared by tasks on the same surfaces.
     """
 
     voronoi: RestrictedVoronoi
@@ -74,16 +75,17 @@ class MeshingTask:
     deadline: Deadline = NO_DEADLINE
     error_weights: PointScalars | None = None
     anchors: Anchors = field(default_factory=Anchors)
+    trees: SearchTrees = field(default_factory=SearchTrees)
 
-    @cached_property
+    @property
     def reference(self) -> ClosestPoints:
         """Closest points of the surface to mesh."""
-        return ClosestPoints(self.surface)
+        return self.trees.of(self.surface)
 
-    @cached_property
+    @property
     def embedded_reference(self) -> ClosestPoints:
         """Closest points of the embedded surface in space, on which the metric is known."""
-        return ClosestPoints(self.voronoi.embedded.surface)
+        return self.trees.of(self.voronoi.embedded.surface)
 
     @cached_property
     def corner_places(self) -> Points:
@@ -158,10 +160,9 @@ def mesh_from_sites(task: MeshingTask, sites: Sites) -> ValidMesh:
     8. Where triangles are still inverted, flat or intersecting, sites are added and all is repeated, at most four
        times. The result has more vertices in all only if that makes it valid.
 
-    If step 1 or 2 fails (a tube thinner than the distance between sites), the surface, which is valid, is coarsened by
-    the same collapses. The paper inserts sites for every defect and optimises again, which makes new defects. Every
-    step is bounded, and steps 4 to 7 keep the topology change by change, so the result is a manifold with the topology
-    of the surface; :func:`anisomesh.mesh.validity.check_validity` counts the geometric faults left.
+    If step 1 or 2 fails (a tube thinner than the distance between sites), the surface is coarsened by the same
+    collapses. The paper adds sites for every defect and optimises again, which makes new ones. Every step is bounded,
+    and steps 4 to 7 keep the topology change by change, so the result is a manifold with the topology of the surface.
 
     References
     ----------

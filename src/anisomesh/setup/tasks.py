@@ -9,6 +9,7 @@ from scipy.spatial import cKDTree
 
 from anisomesh._arrays import CornerTensors, EdgeMask, PointMask, PointScalars, PointTensors, Sites
 from anisomesh.cvt.coarsening import spread_subset
+from anisomesh.cvt.lbfgs import Optimised
 from anisomesh.delaunay.meshing import MeshingTask
 from anisomesh.embedding.base import Embedding
 from anisomesh.embedding.density import area_factors, density_of_sizes
@@ -18,7 +19,7 @@ from anisomesh.features.detect import sharp_edges
 from anisomesh.features.network import FeatureNetwork, trace_features
 from anisomesh.fitting.fit import FitPlan
 from anisomesh.fitting.target import FitTarget
-from anisomesh.mesh.closest_points import ClosestPoints
+from anisomesh.mesh.closest_points import SearchTrees
 from anisomesh.mesh.embedded_surface import EmbeddedSurface
 from anisomesh.mesh.surface import Surface
 from anisomesh.metric.field import MetricField
@@ -67,10 +68,10 @@ class Tasks:
 
 @dataclass(frozen=True, eq=False)
 class Finer:
-    """What a level of detail takes over from a finer one: what is known of the surface, and its sites (S, d)."""
+    """What a level of detail takes over from a finer one: what is known of the surface, and its optimised sites."""
 
     tasks: Tasks
-    sites: Sites
+    optimised: Optimised
 
 
 def set_up(
@@ -105,6 +106,7 @@ def set_up(
             embedding = finer.tasks.embedding
         else:
             embedding = checked_embedding(embedder(options)(working, apart), working)
+        trees = SearchTrees() if finer is None else finer.tasks.dual.trees
         density = None if source.density is None else split.interpolate(source.density)
         asked, weights = _with_density(field, density, working), None
         if prescribes_sizes(options) and not nearest:
@@ -123,12 +125,13 @@ def set_up(
             deadline=run.deadline,
             error_weights=weights,
             anchors=source.anchors(n, measured.frame),
+            trees=trees,
         )
         start = None if finer is None else _start(finer, task, options)
         plan = fit_plan(options, surface, nearest=nearest)
         if plan is not None and source.junctions is not None:  # a decimation of sheets would not fit together
             plan = replace(plan, decimation=None)
-        sizing = PlacedMetric(ClosestPoints(working), asked)
+        sizing = PlacedMetric(trees.of(working), asked)
         metric = replace(sizing, field=field) if weights is None else sizing
         prescribed = bool(source.tagged.any())
         target = None
@@ -152,14 +155,15 @@ def _start(finer: Finer, task: MeshingTask, options: RemeshOptions) -> Sites | N
     On measured surfaces they are denser where that many sites have more energy. On designed ones that says too little:
     cells across a crease have nearly all of the energy until their sites are on it.
     """
-    sites, own, embedded = finer.sites, finer.tasks.dual.voronoi.embedded, task.voronoi.embedded
+    sites, own, embedded = finer.optimised.sites, finer.tasks.dual.voronoi.embedded, task.voronoi.embedded
+    mass = finer.optimised.mass if embedded is own and options.energy is None else None
     if len(sites) <= task.n_vertices:
         return None
     if embedded is not own:
         sites = embedded.points[cKDTree(own.points).query(sites)[1]]
     energy = cvt_options(options, sized=prescribes_sizes(options)).resampling_energy
     energy = None if is_designed(task.surface) else energy
-    return spread_subset(RestrictedVoronoi(embedded, threads=options.threads), sites, task.n_vertices, energy)
+    return spread_subset(task.voronoi, sites, task.n_vertices, energy, mass)
 
 
 def _with_density(field: MetricField, density: PointScalars | None, surface: Surface) -> MetricField:
