@@ -12,6 +12,7 @@ from pathlib import Path
 import pytest
 from batch_tasks import MEMORY, act, kill_every_tenth, limit
 
+from anisomesh.batch.cluster import _LOCAL_CONFIG
 from anisomesh.batch.engine import MAX_TRIES, Work, WorkerPool
 from anisomesh.batch.jobs import Job
 from anisomesh.batch.rows import Results
@@ -41,6 +42,28 @@ def test_a_worker_that_is_killed_as_soon_as_it_has_started_is_started_again():
     """Regression: it began a task before its parent knew it, and no worker was left when it ended."""
     tasks = [{"kind": "kill", "times": 2}, {"kind": "plain", "times": 0}]
     assert [outcome.tries for outcome in WorkerPool(count=1).run(Work(do=act), tasks)] == [3, 1]
+
+
+def test_a_worker_that_ends_in_its_own_start_is_replaced(monkeypatch, tmp_path):
+    """Regression: nothing was started in its place, and the batch gave up after 300 s."""
+    end_starts(monkeypatch, tmp_path, "1 3")  # at first, and after the kill
+    tasks = [{"kind": "kill", "times": 1}, {"kind": "plain", "times": 0}]
+    assert [outcome.tries for outcome in WorkerPool(count=1).run(Work(do=act), tasks)] == [2, 1]
+    assert len(list(tmp_path.iterdir())) == 4
+
+
+def test_a_batch_ends_if_no_worker_can_start(monkeypatch, tmp_path):
+    end_starts(monkeypatch, tmp_path, "1 2")
+    monkeypatch.setattr("anisomesh.batch.cluster._MAX_LOST_STARTS", 2)
+    with pytest.raises(AnisomeshError, match="workers ended in their start"):
+        list(WorkerPool(count=1).run(Work(do=act), [{"kind": "plain", "times": 0}]))
+
+
+def end_starts(monkeypatch, folder, numbers):
+    monkeypatch.setenv("BATCH_TEST_STARTS", str(folder))
+    monkeypatch.setenv("BATCH_TEST_ENDED_STARTS", numbers)
+    preloads = [*_LOCAL_CONFIG["distributed.worker.preload"], "batch_tasks"]
+    monkeypatch.setitem(_LOCAL_CONFIG, "distributed.worker.preload", preloads)
 
 
 def jobs_in(folder, n):

@@ -6,10 +6,11 @@ import faulthandler
 import logging
 import os
 import queue
+import signal
 import time
 from collections import deque
 from collections.abc import Callable, Iterator, Sequence
-from contextlib import contextmanager, suppress
+from contextlib import closing, contextmanager, suppress
 from dataclasses import dataclass
 from functools import cache
 from pathlib import Path
@@ -21,8 +22,10 @@ from anisomesh.errors import AnisomeshError
 logger = logging.getLogger(__name__)
 
 _SECONDS_BETWEEN_LOOKS = 1.0  # at which workers there are; heuristic
+_SECONDS_BETWEEN_FIRST_LOOKS = 0.1  # while there is none; heuristic
 _SECONDS_WITHOUT_WORKERS = 300.0  # until a batch on a cluster gives up, time for a queue to start others; heuristic
 _SECONDS_TO_CONNECT = 30.0
+_MAX_LOST_STARTS = 3  # of processes, one after the other, that end before they can begin a task; heuristic
 _LOCAL_CONFIG = {
     "distributed.scheduler.allowed-failures": 0,  # tries are counted here
     "distributed.worker.memory.target": False,  # results are small, nothing is worth to be spilled
@@ -114,12 +117,13 @@ class _Dispatcher:
     def _ended_tries(self) -> Iterator[_Try]:
         """Yield tries that have ended, or whose worker has, after at most a second."""
         found: list[_Try] = []
+        pause = _SECONDS_BETWEEN_LOOKS if self._workers else _SECONDS_BETWEEN_FIRST_LOOKS
         with suppress(queue.Empty):
-            found.append(self._ended.get(timeout=_SECONDS_BETWEEN_LOOKS))
+            found.append(self._ended.get(timeout=pause))
             while True:
                 found.append(self._ended.get_nowait())
         found = [each for each in found if self._running.get(each.number) is each]
-        if time.monotonic() - self._looked >= _SECONDS_BETWEEN_LOOKS or any(map(_worker_ended, found)):
+        if time.monotonic() - self._looked >= pause or any(map(_worker_ended, found)):
             self._look()
         found += [each for each in self._running.values() if each.worker not in self._workers and each not in found]
         for each in found:
@@ -216,7 +220,52 @@ def _cluster(scheduler: str | None, count: int) -> Iterator[tuple[Any, Callable[
     how = {"threads_per_worker": 1, "dashboard_address": "127.0.0.1:0", "silence_logs": logging.CRITICAL}
     with (
         dask.config.set(_LOCAL_CONFIG),
-        LocalCluster(n_workers=count, processes=True, memory_limit=system.MEMORY_LIMIT // count, **how) as cluster,
+        LocalCluster(n_workers=0, processes=True, memory_limit=system.MEMORY_LIMIT // count, **how) as cluster,
         Client(cluster) as client,
+        closing(_LocalWorkers(cluster, count)) as workers,
     ):
-        yield client, lambda: {nanny.worker_address for nanny in cluster.workers.values()}
+        yield client, workers.started
+
+
+class _LocalWorkers:
+    """The processes of a cluster on this machine, each with a parent (nanny) that starts it, and again if it ends."""
+
+    def __init__(self, cluster: Any, count: int) -> None:
+        self._cluster = cluster
+        self._count = count
+        self._known: set[str] = set()
+        self._lost = 0  # starts that have failed since the last that did not
+        cluster.scale(count)
+
+    def started(self) -> set[str]:
+        """Return the addresses of workers that have started; a parent whose worker ended in its start is replaced.
+
+        Raises
+        ------
+        AnisomeshError
+            If several have ended so, one after the other.
+        """
+        nannies = dict(self._cluster.workers)
+        found = {nanny.worker_address for nanny in nannies.values() if nanny.worker_address is not None}
+        self._lost = 0 if found - self._known else self._lost
+        self._known |= found
+        ended = [name for name, nanny in nannies.items() if nanny.status.name in ("closed", "failed")]
+        if ended:
+            self._lost += len(ended)
+            if self._lost >= _MAX_LOST_STARTS:
+                raise AnisomeshError(
+                    f"{self._lost} workers ended in their start, one after the other, for want of memory or since the "
+                    "installation is damaged; give fewer --workers, or --workers 0 to see what happens without any"
+                )
+            for name in ended:
+                self._cluster.workers.pop(name, None)
+            self._cluster.scale(self._count)
+        return found
+
+    def close(self) -> None:
+        """End the processes at once; a worker that is asked to end would have seconds to finish its task."""
+        for nanny in list(self._cluster.workers.values()):
+            nanny.close_gracefully()  # so that it does not start its process again
+            if nanny.pid is not None:
+                with suppress(ProcessLookupError):
+                    os.kill(nanny.pid, getattr(signal, "SIGKILL", signal.SIGTERM))

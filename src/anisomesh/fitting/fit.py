@@ -10,7 +10,10 @@ from anisomesh.fitting.samples import SurfaceSamples
 from anisomesh.fitting.state import FitState
 from anisomesh.mesh.surface import Surface
 
-_FIRST_SWEEPS, _ROUND_SWEEPS, _LAST_SWEEPS = 4, 2, 8  # at most
+SAMPLES_PER_VERTEX = 40
+"""Samples for each vertex to which a mesh is fitted; fewer are fitted better than the surface between them."""
+
+_LAST_SWEEPS = 8  # at most
 _RISE = (1.0, 7.0, 50.0, 300.0)  # steps of a price that rises
 _MAX_ERROR_FACTOR = 2.5  # root mean squared error over the one at the start, up to which a price rises
 _MIN_SWEEP_GAIN = 1e-2  # of the energy in a sweep, below which it is the last
@@ -29,6 +32,8 @@ class FitOptions:
         point get good only afterwards.
     rounds
         Rounds of exchanges; 0 to keep the points.
+    first_sweeps, round_sweeps
+        Sweeps before the first exchange and after each, at most.
     share
         Points added and removed in a round, of all points.
     min_quality
@@ -39,6 +44,8 @@ class FitOptions:
     price: float = 20.0
     exchange_price: float = 2.0
     rounds: int = 4
+    first_sweeps: int = 4
+    round_sweeps: int = 2
     share: float = 0.05
     min_quality: float = 0.0
 
@@ -60,6 +67,8 @@ class FitPlan:
     relative
         Whether distances count relative to the area that the metric gives a triangle, not as they are. Where triangles
         are ten times as large, their distances are a hundred times as large, and would draw all points there.
+    samples_per_vertex
+        Samples on faces for each vertex of the mesh.
     threads
         Number of threads; the result does not depend on it.
     """
@@ -67,6 +76,7 @@ class FitPlan:
     mesh: FitOptions = field(default_factory=FitOptions)
     decimation: FitOptions | None = None
     relative: bool = False
+    samples_per_vertex: int = SAMPLES_PER_VERTEX
     threads: int = 1
 
 
@@ -133,9 +143,9 @@ def _fit_at(state: FitState, options: FitOptions, unit: float, count: int, deadl
     """Lower the energy with prices in this unit, in every round with an exchange of this many points."""
     price, exchange_price = options.price * unit, options.exchange_price * unit
     state.wake()
-    _settle(state, price, _FIRST_SWEEPS, deadline)
+    _settle(state, price, options.first_sweeps, deadline)
     for _ in range(options.rounds):
-        if deadline.passed() or not _exchange(state, exchange_price, count, deadline):
+        if deadline.passed() or not _exchange(state, exchange_price, count, options.round_sweeps, deadline):
             break
     state.wake()
     _settle(state, price, _LAST_SWEEPS, deadline)
@@ -154,7 +164,7 @@ def _settle(state: FitState, price: float, sweeps: int, deadline: Deadline) -> N
         before = after
 
 
-def _exchange(state: FitState, price: float, count: int, deadline: Deadline) -> bool:
+def _exchange(state: FitState, price: float, count: int, sweeps: int, deadline: Deadline) -> bool:
     """Split edges and collapse as many, and return whether that has lowered the energy; if not, undo it."""
     saved, before = state.saved(), state.energy(price)
     added = state.split(price, count)
@@ -162,7 +172,7 @@ def _exchange(state: FitState, price: float, count: int, deadline: Deadline) -> 
         return False
     state.sweep(price)
     removed = state.collapse(price, added)
-    _settle(state, price, _ROUND_SWEEPS, deadline)
+    _settle(state, price, sweeps, deadline)
     if removed == added and state.energy(price) < before:
         return True
     state.restore(saved)

@@ -20,7 +20,7 @@ from anisomesh.meshops.anchors import Anchors
 from anisomesh.metric.transfer import PlacedMetric
 
 _SAME_PLACE = 1e-9  # at bounding-box diagonal 1
-_SAMPLES_PER_VERTEX, _MIN_SAMPLES = 40, 10_000  # fewer than 40 are fitted better than the surface between them
+_MIN_SAMPLES = 10_000
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -81,14 +81,14 @@ class FitTarget:
         corners, holds_creases, crease_angle, plan
             See the attributes.
         """
+        plan = FitPlan() if plan is None else plan
         samples = sample_surface(
             reference.surface,
-            max(_SAMPLES_PER_VERTEX * n_vertices, _MIN_SAMPLES),
+            max(plan.samples_per_vertex * n_vertices, _MIN_SAMPLES),
             creases=sharp_edges(reference.surface, crease_angle),
             metric=metric,
             rng=np.random.default_rng(0),
         )
-        plan = FitPlan() if plan is None else plan
         return cls(
             reference=reference,
             samples=samples.relative() if plan.relative else samples,

@@ -80,9 +80,7 @@ class Validity:
         return asdict(self)
 
 
-def check_validity(
-    result: Surface, reference: Surface | ClosestPoints, whole: Surface | None = None
-) -> Validity:
+def check_validity(result: Surface, reference: Surface | ClosestPoints, whole: Surface | None = None) -> Validity:
     """Compare the topology of a remesh with its input's and count its defects.
 
     Parameters

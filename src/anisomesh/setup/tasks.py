@@ -128,7 +128,7 @@ def set_up(
             trees=trees,
         )
         start = None if finer is None else _start(finer, task, options)
-        plan = fit_plan(options, surface, nearest=nearest)
+        plan = fit_plan(options, surface, nearest=nearest, warm=start is not None)
         if plan is not None and source.junctions is not None:  # a decimation of sheets would not fit together
             plan = replace(plan, decimation=None)
         sizing = PlacedMetric(trees.of(working), asked)
@@ -156,7 +156,7 @@ def _start(finer: Finer, task: MeshingTask, options: RemeshOptions) -> Sites | N
     cells across a crease have nearly all of the energy until their sites are on it.
     """
     sites, own, embedded = finer.optimised.sites, finer.tasks.dual.voronoi.embedded, task.voronoi.embedded
-    mass = finer.optimised.mass if embedded is own and options.energy is None else None
+    mass = finer.optimised.mass if options.energy is None else None  # about the same in another embedding
     if len(sites) <= task.n_vertices:
         return None
     if embedded is not own:
