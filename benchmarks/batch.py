@@ -17,12 +17,12 @@ from pathlib import Path
 
 import numpy as np
 
-from anisomesh.batch.engine import Work, WorkerPool
 from anisomesh.batch.inputs import jobs_of
 from anisomesh.batch.jobs import Job
 from anisomesh.batch.keys import facts_of_files, key_of
 from anisomesh.batch.running import REMESHING, Batch, Settings
 from anisomesh.batch.work import BatchTask, do
+from anisomesh.execution.engine import Work, WorkerPool
 from anisomesh.io.meshes import save
 from anisomesh.shapes.analytic import sphere
 

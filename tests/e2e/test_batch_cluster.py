@@ -12,12 +12,12 @@ from pathlib import Path
 import pytest
 from batch_tasks import MEMORY, act, kill_every_tenth, limit
 
-from anisomesh.batch.cluster import _LOCAL_CONFIG
-from anisomesh.batch.engine import MAX_TRIES, Work, WorkerPool
 from anisomesh.batch.jobs import Job
 from anisomesh.batch.rows import Results
 from anisomesh.batch.running import Batch, Settings
 from anisomesh.errors import AnisomeshError
+from anisomesh.execution.cluster import _LOCAL_CONFIG
+from anisomesh.execution.engine import MAX_TRIES, Work, WorkerPool
 from conftest import torus_arrays, write_obj
 
 pytest.importorskip("distributed")
@@ -54,7 +54,7 @@ def test_a_worker_that_ends_in_its_own_start_is_replaced(monkeypatch, tmp_path):
 
 def test_a_batch_ends_if_no_worker_can_start(monkeypatch, tmp_path):
     end_starts(monkeypatch, tmp_path, "1 2")
-    monkeypatch.setattr("anisomesh.batch.cluster._MAX_LOST_STARTS", 2)
+    monkeypatch.setattr("anisomesh.execution.cluster._MAX_LOST_STARTS", 2)
     with pytest.raises(AnisomeshError, match="workers ended in their start"):
         list(WorkerPool(count=1).run(Work(do=act), [{"kind": "plain", "times": 0}]))
 
@@ -91,7 +91,7 @@ def test_a_running_cluster_is_used_and_left_running(monkeypatch):
         tasks = [{"kind": "plain", "times": 0}, {"kind": "kill", "times": 1}, {"kind": "plain", "times": 0}]
         assert sorted((o.number, o.tries) for o in workers.run(work, tasks)) == [(0, 1), (1, 2), (2, 1)]
         assert len({outcome.result for outcome in workers.run(work, tasks[:1])}) == 1
-    monkeypatch.setattr("anisomesh.batch.cluster._SECONDS_TO_CONNECT", 0.5)
+    monkeypatch.setattr("anisomesh.execution.cluster._SECONDS_TO_CONNECT", 0.5)
     with pytest.raises(AnisomeshError, match="no scheduler answers"):
         list(WorkerPool(scheduler="tcp://127.0.0.1:9").run(work, tasks))
 
@@ -99,7 +99,7 @@ def test_a_running_cluster_is_used_and_left_running(monkeypatch):
 SCRIPT = """
 import os, signal, sys, time
 from pathlib import Path
-from anisomesh.batch.engine import Work, WorkerPool
+from anisomesh.execution.engine import Work, WorkerPool
 from batch_tasks import note_and_wait
 if __name__ == "__main__":
     signal.signal(signal.SIGINT, signal.default_int_handler)  # it may be ignored where the tests were started

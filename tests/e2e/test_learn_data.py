@@ -14,6 +14,7 @@ import typer
 import anisomesh
 from anisomesh.cli.dataset import app
 from anisomesh.errors import MeshFileError, OptionError
+from anisomesh.execution.engine import WorkerPool
 from anisomesh.learn.data.build import build
 from anisomesh.learn.data.items import load_item
 from anisomesh.learn.data.manifest import MANIFEST, files_of, read_manifest
@@ -46,23 +47,16 @@ def folder(tmp_path):
     return folder
 
 
-@pytest.fixture
-def in_this_process(monkeypatch):
-    """Make items without a new process for each source."""
-    monkeypatch.setattr("anisomesh.learn.data.build.isolated", lambda work: work)
-
-
 @pytest.mark.slow
-def test_a_build_keeps_drops_and_lists_and_a_second_one_does_nothing(folder, tmp_path, monkeypatch):
-    """A source that is kept and one that fails get processes of their own; the others are made in this one."""
+def test_a_build_keeps_drops_and_lists_and_a_second_one_does_nothing(folder, tmp_path):
+    """A source that is kept and one that fails are made by workers; the others in this process."""
     out, calls = tmp_path / "out", []
     recipe = Recipe(target=100, variants=("decimated",), min_stretch=1.2)
     sources = sources_of(folder, 1)
     two = [source for source in sources if source.name in {"egg", "bad"}]
-    first = build(two, out, recipe, remesh, workers=2, on_row=lambda *step: calls.append(step))
+    first = build(two, out, recipe, remesh, workers=WorkerPool(count=2), on_row=lambda *step: calls.append(step))
     assert sorted(number for _, number, _ in calls) == [1, 2]
-    monkeypatch.setattr("anisomesh.learn.data.build.isolated", lambda work: work)
-    rows = build(sources, out, recipe, remesh, workers=1, on_row=lambda *step: calls.append(step))
+    rows = build(sources, out, recipe, remesh, on_row=lambda *step: calls.append(step))
     assert all(row in rows for row in first)
     status = {row["name"]: row["status"] for row in rows}
     good = {"egg": "kept", "egg2": "kept", "more-ring": "kept", "blobs-0000": "kept"}
@@ -77,24 +71,24 @@ def test_a_build_keeps_drops_and_lists_and_a_second_one_does_nothing(folder, tmp
             assert len(item.points) == entry["points"]
     assert sorted(number for _, number, _ in calls) == [1, 1, 2, 2, 3, 4]
     calls.clear()
-    again = build(sources, out, recipe, remesh, workers=1, on_row=lambda *step: calls.append(step))
+    again = build(sources, out, recipe, remesh, on_row=lambda *step: calls.append(step))
     assert (again, calls) == (rows, [])
     anisomesh.save(ellipsoid((1.0, 0.6, 0.3), 2), folder / "egg.ply")
     ring = next(row for row in rows if row["name"] == "more-ring")
     (out / ring["items"][0]["file"]).unlink()
-    build(sources_of(folder, 1), out, recipe, remesh, workers=1, on_row=lambda *step: calls.append(step))
+    build(sources_of(folder, 1), out, recipe, remesh, on_row=lambda *step: calls.append(step))
     assert {row["name"] for row, _, _ in calls} == {"egg", "more-ring"}  # what has changed, or is gone
 
 
 @pytest.mark.slow
-def test_a_build_that_was_killed_goes_on(in_this_process, folder, tmp_path):
+def test_a_build_that_was_killed_goes_on(folder, tmp_path):
     out = tmp_path / "out"
     code = (
         "from pathlib import Path; from anisomesh.learn.data.build import build\n"
         "from anisomesh.learn.data.sources import sources_of; from anisomesh.pipeline import remesh\n"
-        "from anisomesh.learn.data.recipe import Recipe\n"
+        "from anisomesh.learn.data.recipe import Recipe; from anisomesh.execution.engine import WorkerPool\n"
         f"if __name__ == '__main__': build(sources_of(Path({str(folder)!r}), 0), Path({str(out)!r}), "
-        "Recipe(target=100, variants=('decimated',)), remesh, workers=1)"
+        "Recipe(target=100, variants=('decimated',)), remesh, workers=WorkerPool(count=1))"
     )
     script = tmp_path / "run.py"
     script.write_text(code)
@@ -112,23 +106,23 @@ def test_a_build_that_was_killed_goes_on(in_this_process, folder, tmp_path):
     with (out / MANIFEST).open("a") as file:
         file.write('{"name": "half a ro')
     made = []
-    rows = build(sources_of(folder, 0), out, RECIPE, remesh, workers=1, on_row=lambda row, *_: made.append(row["name"]))
+    rows = build(sources_of(folder, 0), out, RECIPE, remesh, on_row=lambda row, *_: made.append(row["name"]))
     assert len(rows) == 5
     assert set(made) == {row["name"] for row in rows} - {row["name"] for row in before}
     assert len(read_manifest(out)) == 5
 
 
 @pytest.mark.slow
-def test_the_manifest_has_the_requested_sources_and_their_current_families(in_this_process, folder, tmp_path):
+def test_the_manifest_has_the_requested_sources_and_their_current_families(folder, tmp_path):
     out, recipe = tmp_path / "out", Recipe(target=100, variants=())
-    build(sources_of(folder, 2), out, recipe, remesh, workers=1)
+    build(sources_of(folder, 2), out, recipe, remesh)
     (folder / "odd.ply").mkdir()  # no mesh, in spite of its name
     files = [path.relative_to(folder).as_posix() for path in sorted(folder.rglob("*.ply")) if path.is_file()]
     list_ = "".join(f"{file},{'one' if 'egg' in file else file}\n" for file in files)
     (folder / "manifest.csv").write_text("\ufefffile,family\n" + list_, encoding="utf-8")
     made = []
     sources = sources_of(folder, 1, validation=0.6)
-    rows = build(sources, out, recipe, remesh, workers=1, on_row=lambda row, *_: made.append(row))
+    rows = build(sources, out, recipe, remesh, on_row=lambda row, *_: made.append(row))
     (folder / "odd.ply").rmdir()
     assert made == []
     assert read_manifest(out) == rows

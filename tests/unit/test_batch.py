@@ -9,7 +9,6 @@ from pathlib import Path
 import pytest
 
 from anisomesh.batch import Job, Settings, WorkerPool, run
-from anisomesh.batch.engine import Outcome, Work, has_dask
 from anisomesh.batch.inputs import jobs_of
 from anisomesh.batch.jobs import checked
 from anisomesh.batch.keys import facts_of_files, key_of
@@ -19,6 +18,7 @@ from anisomesh.batch.rows import Results
 from anisomesh.batch.running import Batch
 from anisomesh.batch.work import BatchTask, do
 from anisomesh.errors import AnisomeshError, OptionError
+from anisomesh.execution.engine import Outcome, Work, has_dask
 from anisomesh.io.meshes import load
 from conftest import torus_arrays, write_obj
 
@@ -328,7 +328,7 @@ def test_in_this_process_errors_are_outcomes():
 
 
 def test_workers_without_dask_are_refused_with_the_remedy(monkeypatch):
-    monkeypatch.setattr("anisomesh.batch.engine.has_dask", lambda: False)
+    monkeypatch.setattr("anisomesh.execution.engine.has_dask", lambda: False)
     assert WorkerPool().in_this_process
     assert WorkerPool(count=1).in_this_process
     for words in ({"count": 2}, {"scheduler": "tcp://host:8786"}):

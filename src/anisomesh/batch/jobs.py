@@ -6,7 +6,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 
-from anisomesh.batch.options import TABLES, Options, plain_options
+from anisomesh.batch.options import FIELDS, TABLES, Options, file_and_field, plain_options
 from anisomesh.batch.places import absolute, exists, is_address, joined, suffix_of
 from anisomesh.errors import OptionError
 from anisomesh.io.known_formats import MESH_FORMATS
@@ -27,7 +27,7 @@ class Job:
     options
         Keywords of :func:`anisomesh.pipeline.remesh` with plain values: ``n_vertices``, ``ratio`` (also ``"20%"``),
         ``max_error`` or ``edge_length`` (also ``"0.1%"`` of the diagonal), and others; of ``features``, ``keep_points``
-        and ``density`` the names of text files.
+        and ``density`` the names of text files. ``metric_file``, ``adapt_to`` and ``norm`` are as on the command line.
     """
 
     input: str
@@ -38,6 +38,9 @@ class Job:
     def files(self) -> dict[str, str]:
         """The files that the job reads, by what they are: ``"input"``, or the name of an option."""
         named = {name: self.options[name] for name in TABLES if name in self.options}
+        for name in FIELDS:
+            if name in self.options and (file := file_and_field(name, self.options[name])[0]) is not None:
+                named[name] = file
         weights = self.options.get("weights")
         if weights is not None and exists(str(weights)):  # else the name of a pretrained network
             named["weights"] = str(weights)
@@ -80,7 +83,8 @@ def _in_one_form(job: Job) -> Job:
     options = plain_options(job.options, where)
     found = replace(job, input=absolute(job.input), options=options)
     files = {name: absolute(place) for name, place in found.files.items() if name != "input"}
-    return replace(found, options=options | files)
+    fields = {name: files[name] + file_and_field(name, options[name])[1] for name in FIELDS if name in files}
+    return replace(found, options=options | files | fields)
 
 
 def _check_outputs(jobs: Sequence[Job], folder: str) -> None:

@@ -8,7 +8,7 @@ from collections.abc import Mapping
 from importlib.metadata import version
 
 from anisomesh.batch.jobs import Job
-from anisomesh.batch.options import TABLES, that_matter
+from anisomesh.batch.options import FIELDS, TABLES, file_and_field, that_matter
 from anisomesh.batch.places import hash_of, local_copy, stamp_of, suffix_of
 
 FileFacts = dict[str, list[str]]
@@ -46,6 +46,10 @@ def key_of(job: Job, files: FileFacts) -> str:
     """Return the hash of what the result of a job depends on: contents of files, options, format and version."""
     contents = {name: content for name, (_, content) in files.items()}
     options = {name: value for name, value in that_matter(job.options).items() if name not in (*TABLES, "weights")}
+    for name in FIELDS:
+        if name in files:
+            place, field = file_and_field(name, options[name])
+            options[name] = suffix_of(str(place)) + field
     weights = job.options.get("weights") if "weights" not in files else None
     parts = [contents, options, weights, suffix_of(job.output), version("anisomesh")]
     return hashlib.sha256(json.dumps(parts, sort_keys=True, default=str).encode()).hexdigest()

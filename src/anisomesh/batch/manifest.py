@@ -10,14 +10,14 @@ from typing import Any
 
 from anisomesh.batch.inputs import in_format
 from anisomesh.batch.jobs import Job
-from anisomesh.batch.options import OPTION_NAMES, TABLES, TARGETS, Options
+from anisomesh.batch.options import FIELDS, METRICS, OPTION_NAMES, TABLES, TARGETS, Options, file_and_field
 from anisomesh.batch.places import is_address, joined
 from anisomesh.errors import OptionError, why_unreadable
 from anisomesh.toml import check_keys
 
 _KNOWN_COLUMNS = ("input", "output", *OPTION_NAMES)
 _WORDS = {"true": True, "false": False, "yes": True, "no": False}
-_TEXTS = ("input", "output", "weights", "lock", *TABLES)
+_TEXTS = ("input", "output", "weights", "lock", *TABLES, *FIELDS)
 
 
 def read_manifest(path: Path, options: Options, *, output_format: str | None = None) -> list[Job]:
@@ -31,7 +31,7 @@ def read_manifest(path: Path, options: Options, *, output_format: str | None = N
         relative to the folder of the manifest, outputs to the one of the batch.
     options
         Options of every job that its row does not replace. A row with one of ``n_vertices``, ``ratio``, ``max_error``
-        and ``edge_length`` replaces them all.
+        and ``edge_length`` replaces them all, and so does one of ``metric``, ``metric_file`` and ``adapt_to``.
     output_format
         Format of the outputs of rows that name none; by default the one of the input.
 
@@ -68,9 +68,13 @@ def _job(where: str, row: dict[str, Any], options: Options, folder: Path, output
     if output is None:
         is_elsewhere = is_address(source) or Path(source).is_absolute()
         output = in_format(Path(source).name if is_elsewhere else _below(source), output_format)
-    base = {} if any(name in given for name in TARGETS) else {n: options[n] for n in TARGETS if n in options}
-    base |= {name: value for name, value in options.items() if name not in TARGETS}
+    replaced = {name for group in (TARGETS, METRICS) if any(name in given for name in group) for name in group}
+    base = {name: value for name, value in options.items() if name not in replaced}
     given |= {name: joined(str(folder), str(given[name])) for name in TABLES if name in given}
+    for name in FIELDS:
+        if name in given:
+            file, field = file_and_field(name, str(given[name]))
+            given[name] = field if file is None else joined(str(folder), file) + field
     return Job(input=joined(str(folder), source), output=output, options=base | given)
 
 

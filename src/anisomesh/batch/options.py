@@ -5,7 +5,7 @@ from __future__ import annotations
 import os
 from collections.abc import Callable
 from dataclasses import fields
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from anisomesh._values import Length
 from anisomesh.counts.target import read_target
@@ -13,15 +13,26 @@ from anisomesh.errors import OptionError
 from anisomesh.options import RemeshOptions, with_overrides
 from anisomesh.toml import check_keys
 
+if TYPE_CHECKING:
+    from anisomesh.metric.prescribed import AdaptTo, MetricFile
+
 TARGETS = ("n_vertices", "ratio", "max_error", "edge_length")
 """Options that say how many vertices a result has; a job has one of them."""
 TABLES = ("features", "keep_points", "density")
 """Options whose value is the name of a text file with numbers for a mesh."""
-_LENGTHS = ("max_error", "edge_length", "weld_tolerance")
-_OBJECTS = ("energy", "size_field", "min_size", "max_size", "gradation")  # without a form in a file of jobs
+METRICS = ("metric", "metric_file", "adapt_to")
+"""Options that say what the metric is; a job has one of them at most."""
+FIELDS = METRICS[1:]
+"""Options whose value is a field at points: ``FILE``, ``FILE:NAME``, or for ``adapt_to`` also the name of one of the
+input."""
+_LIMITS = ("min_size", "max_size", "gradation")  # of the sizes in a metric_file
+_LENGTHS = ("max_error", "edge_length", "weld_tolerance", "min_size", "max_size")
+_OBJECTS = ("energy", "size_field")  # without a form in a file of jobs
 _WITHOUT_EFFECT = ("threads",)  # on the result
 OPTION_NAMES = tuple(
-    name for name in (*TARGETS[:3], *(field.name for field in fields(RemeshOptions))) if name not in _OBJECTS
+    name
+    for name in (*TARGETS[:3], *FIELDS, "norm", *(field.name for field in fields(RemeshOptions)))
+    if name not in _OBJECTS
 )
 """Names that the options of a job can have: the keywords of a remesh that files can hold."""
 
@@ -51,17 +62,75 @@ def plain_options(options: Options, where: str) -> Options:
     except OptionError as error:
         raise OptionError(f"{where}: {error}") from error
     default = RemeshOptions()
-    return {name: value for name, value in read.items() if name in TARGETS or value != getattr(default, name)}
+    return {name: value for name, value in read.items() if name in TARGETS or value != getattr(default, name, None)}
 
 
 def _check(options: Options) -> None:
     """Raise OptionError if options cannot be the ones of a remesh of any mesh."""
-    keywords = {name: value for name, value in in_model_units(options, diagonal=1.0).items() if name not in TABLES}
+    _check_metric(options)
+    apart = (*TABLES, *FIELDS, "norm", *_LIMITS)
+    keywords = {name: value for name, value in in_model_units(options, diagonal=1.0).items() if name not in apart}
     target = {name: keywords.pop(name, None) for name in TARGETS[:3]}
     known = with_overrides(RemeshOptions(), keywords)
-    read_target(target["n_vertices"], target["ratio"], target["max_error"], known)
+    if "metric_file" not in options or any(value is not None for value in target.values()):
+        read_target(target["n_vertices"], target["ratio"], target["max_error"], known)
     if known.has_tensors:
         raise OptionError(f"metric = {known.metric!r}; expected the name of a metric")
+
+
+def _check_metric(options: Options) -> None:
+    """Raise OptionError if options that say what the metric is do not fit each other."""
+    named = [name for name in METRICS if name in options]
+    if len(named) > 1:
+        raise OptionError(f"{' and '.join(named)} say what the metric is; give one of them")
+    if "norm" in options and "adapt_to" not in options:
+        raise OptionError("norm goes with adapt_to; give both or leave it out")
+    limits = {name: value for name, value in in_model_units(options, diagonal=1.0).items() if name in _LIMITS}
+    if limits and "metric_file" not in options:
+        raise OptionError(
+            f"{' and '.join(limits)}: only sizes can be limited; give a metric_file with lengths of edges"
+        )
+    if limits:
+        with_overrides(RemeshOptions(), {"metric": "uniform", "size_field": [1.0], **limits})
+    if "metric_file" in options and str(options.get("edge_length", "")).endswith("%"):
+        raise OptionError(
+            f"edge_length = {options['edge_length']}: in the metric of a file it is a number, and 1 without this option"
+        )
+    if "adapt_to" in options and ("edge_length" in options or "max_error" in options):
+        raise OptionError("adapt_to says where triangles are small, not how small; give n_vertices or ratio with it")
+
+
+def file_and_field(name: str, spec: str) -> tuple[str | None, str]:
+    """Return the file and the rest of the value of an option of :data:`FIELDS`, such as ``a.vtu`` and ``:size``.
+
+    The file is None for the name of a field of the input.
+    """
+    from anisomesh.io.fields.load import split_spec
+
+    field = split_spec(spec)[1]
+    if field is None:
+        return (spec, "") if name == "metric_file" else (None, spec)
+    return spec[: -len(field) - 1], f":{field}"
+
+
+def prescribed_by(options: Options) -> MetricFile | AdaptTo | None:
+    """Return the metric that a field prescribes, None if none does.
+
+    Raises
+    ------
+    MeshFileError
+        If the file of a metric cannot be read, or has no such field.
+    OptionError
+        If the norm is not a number of at least 1.
+    """
+    from anisomesh.metric.prescribed import DEFAULT_NORM, AdaptTo, MetricFile
+
+    if "metric_file" in options:
+        return MetricFile.read(options["metric_file"])
+    if "adapt_to" in options:
+        angle = options.get("feature_angle", RemeshOptions.feature_angle)
+        return AdaptTo.parse(options["adapt_to"], str(options.get("norm", DEFAULT_NORM)), angle)
+    return None
 
 
 def in_model_units(options: Options, diagonal: float) -> Options:
@@ -74,7 +143,10 @@ def in_model_units(options: Options, diagonal: float) -> Options:
 
 
 def for_mesh(options: Options, diagonal: float) -> Options:
-    """Return options as keywords of a remesh: lengths in model units, the numbers in the files of tables."""
+    """Return options as keywords of a remesh: lengths in model units, the numbers in the files of tables.
+
+    Fields that prescribe a metric are left out, see :func:`prescribed_by`.
+    """
     from anisomesh.io.text_tables import load_numbers, load_pairs, load_points
 
     readers: dict[str, Callable[[str], Any]] = {
@@ -83,7 +155,8 @@ def for_mesh(options: Options, diagonal: float) -> Options:
         "density": load_numbers,
     }
     tables = {name: readers[name](options[name]) for name in TABLES if name in options}
-    return in_model_units(options, diagonal) | tables
+    plain = {name: value for name, value in options.items() if name not in (*FIELDS, "norm")}
+    return in_model_units(plain, diagonal) | tables
 
 
 def that_matter(options: Options) -> Options:
@@ -96,10 +169,11 @@ def _read(name: str, value: Any) -> Any:
     if isinstance(value, os.PathLike):
         value = os.fspath(value)
     items = value if isinstance(value, list | tuple) else [value]
-    if not all(isinstance(item, str if name in TABLES else str | int | float) for item in items):
-        expected = "the name of a text file" if name in TABLES else "a number, a text, true or false"
+    is_name = name in (*TABLES, *FIELDS)
+    if not all(isinstance(item, str if is_name else str | int | float) for item in items):
+        expected = "the name of a file" if is_name else "a number, a text, true or false"
         raise OptionError(f"{name} is of type {type(value).__name__}; expected {expected}")
-    if not isinstance(value, str) or name in TABLES:
+    if not isinstance(value, str) or is_name:
         return value
     if name == "ratio" and value.endswith("%"):
         return float(Length.parse(value, name).value) / 100.0

@@ -11,13 +11,13 @@ from importlib.metadata import version
 from operator import attrgetter
 from pathlib import Path
 
-from anisomesh.batch.engine import Outcome, Work, WorkerPool
 from anisomesh.batch.jobs import Job, checked
 from anisomesh.batch.places import absolute, is_address, joined
 from anisomesh.batch.reports import PAGE, write_page, write_parquet
 from anisomesh.batch.rows import Results, Row, is_done, picture_of
 from anisomesh.batch.work import BatchTask, do, prepare_process
 from anisomesh.errors import OptionError
+from anisomesh.execution.engine import Outcome, Work, WorkerPool
 from anisomesh.io.atomic import remove_leftovers
 
 REMESHING = Work(do=do, prepare=prepare_process, limit=attrgetter("limit"))

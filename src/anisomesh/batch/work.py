@@ -6,14 +6,14 @@ import logging
 import time
 import traceback
 from collections.abc import Iterator
-from contextlib import contextmanager
+from contextlib import contextmanager, nullcontext
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from anisomesh.batch.jobs import Job
 from anisomesh.batch.keys import facts_of_files, key_of
-from anisomesh.batch.options import for_mesh
+from anisomesh.batch.options import for_mesh, prescribed_by
 from anisomesh.batch.places import local_copy, local_output
 from anisomesh.errors import AnisomeshError
 
@@ -87,7 +87,11 @@ def _remesh(task: BatchTask, *, draw: bool) -> dict[str, Any]:
 
     with local_copy(task.job.input) as path:
         mesh = load_mesh(path)
-    result = remesh(mesh, **for_mesh(task.job.options, mesh.surface.diagonal))
+    keywords, prescribed = for_mesh(task.job.options, mesh.surface.diagonal), prescribed_by(task.job.options)
+    if prescribed is not None:
+        keywords |= prescribed.options_for(mesh, task.job.input)
+    with nullcontext() if prescribed is None else prescribed.named_in_errors():
+        result = remesh(mesh, **keywords)
     with local_output(task.target) as path:
         save(result.mesh, path)
     if draw and task.picture is not None:

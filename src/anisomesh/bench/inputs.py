@@ -22,10 +22,14 @@ _TORUS_POINTS = 6_000  # heuristic
 
 @dataclass(frozen=True)
 class Input:
-    """A mesh by name, loaded or generated on demand."""
+    """A mesh by name, loaded from a file, or the procedural shape of this name if there is none."""
 
     name: str
-    make: Callable[[], Surface]
+    path: Path | None = None
+
+    def make(self) -> Surface:
+        """Return the mesh."""
+        return make_shape(self.name) if self.path is None else load(self.path)
 
 
 def inputs_of(suite: Suite, data: Path | None) -> list[Input]:
@@ -52,8 +56,8 @@ def inputs_of(suite: Suite, data: Path | None) -> list[Input]:
         paths = sorted(data.glob(pattern))
         if not paths:
             raise OptionError(f"suite {suite.name} needs the meshes {pattern}, and {data} has none of them")
-        found += [Input(str(path.relative_to(data)), _loader(path)) for path in paths]
-    found += [Input(spec, _maker(spec)) for spec in suite.shapes]
+        found += [Input(str(path.relative_to(data)), path) for path in paths]
+    found += [Input(spec) for spec in suite.shapes]
     return list({entry.name: entry for entry in found}.values())
 
 
@@ -97,11 +101,3 @@ def _stretched_torus(ratio: float) -> Surface:
     minor = 1.0 / (ratio**2 - 1.0)
     n_minor = max(12, round(np.sqrt(_TORUS_POINTS * minor)))
     return torus(1.0, minor, max(24, round(_TORUS_POINTS / n_minor)), n_minor)
-
-
-def _loader(path: Path) -> Callable[[], Surface]:
-    return lambda: load(path)
-
-
-def _maker(spec: str) -> Callable[[], Surface]:
-    return lambda: make_shape(spec)

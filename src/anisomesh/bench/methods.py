@@ -36,7 +36,6 @@ class Method:
 
     run: Callable[[Surface, int, int, dict[str, Any]], MethodResult]
     packages: tuple[str, ...] = ()
-    isolated: bool = False  # run in a process of its own, because the library can end the process
 
     @property
     def missing(self) -> list[str]:
@@ -154,9 +153,9 @@ METHODS = {
     "vtk-quadric": Method(_vtk_quadric, ("pyvista",)),
     "fast-simplification": Method(_fast_simplification, ("fast_simplification",)),
     "acvd": Method(_acvd, ("pyacvd", "pyvista")),
-    "pymeshlab-quadric": Method(_pymeshlab, ("pymeshlab",), isolated=True),
-    "mmg": Method(_mmg, ("mmgpy",), isolated=True),
-    "mmg-metric": Method(_mmg_with_metric, ("mmgpy",), isolated=True),
+    "pymeshlab-quadric": Method(_pymeshlab, ("pymeshlab",)),
+    "mmg": Method(_mmg, ("mmgpy",)),
+    "mmg-metric": Method(_mmg_with_metric, ("mmgpy",)),
 }
 """All methods by name. The options in a suite are passed to the function of the library."""
 

@@ -4,7 +4,9 @@ from __future__ import annotations
 
 import time
 from collections.abc import Callable, Iterator, Sequence
+from contextlib import closing
 from dataclasses import dataclass
+from functools import lru_cache
 from itertools import product
 from pathlib import Path
 from typing import Any
@@ -16,7 +18,7 @@ from anisomesh.bench.suite import Suite, SuiteMethod
 from anisomesh.bench.training import train_networks
 from anisomesh.errors import AnisomeshError
 from anisomesh.evaluation.report import evaluate
-from anisomesh.execution.isolation import isolated
+from anisomesh.execution.engine import Work, WorkerPool
 from anisomesh.io.results.json_lines import append_line, as_line, drop_cut_line, not_a_row
 from anisomesh.io.results.json_lines import read_rows as read_lines
 from anisomesh.mesh.surface import Surface
@@ -44,6 +46,7 @@ def run_suite(
     *,
     data: Path | None = None,
     items: Path | None = None,
+    workers: WorkerPool | None = None,
     on_row: Callable[[SuiteProgress], None] = lambda progress: None,
     on_epoch: Callable[[str], None] = lambda text: None,
 ) -> list[RunRow]:
@@ -60,6 +63,9 @@ def run_suite(
         Folder of the mesh files of the suite.
     items
         Data set for suites that train networks. The networks are written beside the rows.
+    workers
+        What does the runs; by default this process. A library that crashes ends a worker, and its run with it; several
+        workers make each other slower.
     on_row
         Called after every run.
     on_epoch
@@ -77,26 +83,27 @@ def run_suite(
     ------
     OptionError
         If a mesh of the suite cannot be found, or there are networks to train and no data set.
+
+    Notes
+    -----
+    Workers are spawned, so a script that has some needs ``if __name__ == "__main__"``.
     """
     inputs = inputs_of(suite, data)
     drop_cut_line(out)
     known = {_key(row): row for row in read_rows(out)}
     jobs = [job for job in _jobs(suite, inputs) if not _is_done(known.get(job.key), job)]
     weights = train_networks(suite, out.with_suffix(""), items, on_epoch) if jobs else {}
+    tasks = [_Task(job, suite, weights.get(job.method.name)) for job in jobs]
     start = time.monotonic()
-    loaded: _Loaded | None = None
-    for number, job in enumerate(jobs, 1):
-        try:
-            loaded = _loaded(job, loaded)
-            row = _run(job, loaded, suite, weights.get(job.method.name))
-        except AnisomeshError as error:
-            loaded = None
-            row = {**job.start, "status": "failed", "error": str(error)}
-        if row["status"] != "absent":
-            append_line(out, as_line(row))
-        known[job.key] = row
-        left = (time.monotonic() - start) / number * (len(jobs) - number)
-        on_row(SuiteProgress(row, number, len(jobs), left))
+    with closing((workers or WorkerPool(count=0)).run(_WORK, tasks)) as outcomes:
+        for number, outcome in enumerate(outcomes, 1):
+            job = jobs[outcome.number]
+            row = outcome.result or {**job.start, "status": "failed", "error": outcome.error}
+            if row["status"] != "absent":
+                append_line(out, as_line(row))
+            known[job.key] = row
+            left = (time.monotonic() - start) / number * (len(jobs) - number)
+            on_row(SuiteProgress(row, number, len(jobs), left))
     return [known[job.key] for job in _jobs(suite, inputs)]
 
 
@@ -152,22 +159,30 @@ class _Job:
 
 
 @dataclass(frozen=True)
-class _Loaded:
-    """A clean mesh and the input of the methods that is made from it."""
+class _Task:
+    """A job for a worker, and the weights of its network, None for none."""
 
-    name: str
-    clean: Surface
-    input_name: str
-    input: Surface
+    job: _Job
+    suite: Suite
+    weights: Path | None
 
 
-def _loaded(job: _Job, previous: _Loaded | None) -> _Loaded:
-    """Return the mesh and the input of a job, reusing the previous ones if they are equal."""
-    same_mesh = previous is not None and previous.name == job.mesh.name
-    if previous is not None and same_mesh and previous.input_name == job.input_name:
-        return previous
-    clean = previous.clean if previous is not None and same_mesh else prepare(job.mesh.make()).surface
-    return _Loaded(job.mesh.name, clean, job.input_name, disturbed(clean, job.input_name, job.mesh.name))
+@lru_cache(maxsize=1)
+def _clean(mesh: Input) -> Surface:
+    """Return a mesh after the repair; jobs that follow each other often have the same."""
+    return prepare(mesh.make()).surface
+
+
+@lru_cache(maxsize=1)
+def _disturbed(mesh: Input, input_name: str) -> Surface:
+    """Return the input of the methods that is made from a mesh."""
+    return disturbed(_clean(mesh), input_name, mesh.name)
+
+
+def _forget() -> None:
+    """Forget the meshes of an earlier run: their files may have changed."""
+    _clean.cache_clear()
+    _disturbed.cache_clear()
 
 
 def _jobs(suite: Suite, meshes: list[Input]) -> Iterator[_Job]:
@@ -185,20 +200,26 @@ def _is_done(row: RunRow | None, job: _Job) -> bool:
     return row is not None and row["options"] == job.start["options"]
 
 
-def _run(job: _Job, loaded: _Loaded, suite: Suite, weights: Path | None) -> RunRow:
+def _do(task: _Task, attempt: int) -> RunRow:
+    """Return the row of a run."""
+    job, suite = task.job, task.suite
     remesher = METHODS[job.method.method]
-    if suite.closed and (loaded.clean.edge_face_count == 1).any():
-        return {**job.start, "status": "skipped", "error": "the mesh is open"}
-    if remesher.missing:
-        return {**job.start, "status": "absent", "error": f"{', '.join(remesher.missing)} not installed"}
-    n = max(MIN_VERTICES, round(job.ratio * loaded.clean.n_points))
+    try:
+        clean = _clean(job.mesh)
+        if suite.closed and (clean.edge_face_count == 1).any():
+            return {**job.start, "status": "skipped", "error": "the mesh is open"}
+        if remesher.missing:
+            return {**job.start, "status": "absent", "error": f"{', '.join(remesher.missing)} not installed"}
+        given = _disturbed(job.mesh, job.input_name)
+    except AnisomeshError as error:
+        return {**job.start, "status": "failed", "error": str(error)}
+    n = max(MIN_VERTICES, round(job.ratio * clean.n_points))
     start = time.perf_counter()
     try:
-        run = isolated(remesher.run) if remesher.isolated else remesher.run
-        options = job.method.options if weights is None else {**job.method.options, "weights": str(weights)}
-        result: MethodResult = run(loaded.input, n, job.seed, options)
+        options = job.method.options if task.weights is None else {**job.method.options, "weights": str(task.weights)}
+        result: MethodResult = remesher.run(given, n, job.seed, options)
         seconds = time.perf_counter() - start
-        evaluation = evaluate(loaded.clean, result.surface, samples=suite.samples).as_dict()
+        evaluation = evaluate(clean, result.surface, samples=suite.samples).as_dict()
     except Exception as error:  # a failure of a library is a result of the benchmark
         return {**job.start, "status": "failed", "error": f"{type(error).__name__}: {error}", "asked": n}
     return {
@@ -209,3 +230,6 @@ def _run(job: _Job, loaded: _Loaded, suite: Suite, weights: Path | None) -> RunR
         "facts": result.facts,
         "evaluation": evaluation,
     }
+
+
+_WORK = Work(do=_do, prepare=_forget)

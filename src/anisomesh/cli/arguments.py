@@ -19,6 +19,7 @@ from anisomesh.options import MAX_THREADS, DeviceName, EmbeddingName, RemeshOpti
 DEFAULT_OPTIONS = RemeshOptions()
 _option = partial(typer.Option, rich_help_panel="How to remesh")
 target_option = partial(typer.Option, rich_help_panel="Number of vertices")
+input_option = partial(typer.Option, rich_help_panel="Input")
 _advanced = partial(typer.Option, rich_help_panel="Advanced")
 _Command = TypeVar("_Command", bound=Callable[..., None])
 
@@ -234,3 +235,51 @@ InputFormat = Annotated[
     str | None, typer.Option(metavar="FORMAT", help="Format of IN, if its suffix does not name it: ply, obj, ...")
 ]
 Quiet = Annotated[bool, typer.Option("--quiet", "-q", help="No progress and no summary.")]
+Workers = Annotated[
+    int | None,
+    typer.Option(
+        min=0,
+        metavar="N",
+        help="Processes, one thread each (extra: batch); 0 for none but this one.",
+        show_default="one per core",
+    ),
+]
+MetricFileName = Annotated[
+    str | None,
+    input_option(
+        metavar="FILE[:NAME]",
+        help="Lengths of edges, or metric tensors, at the points of IN, in model units: .sol, .solb, .npy, or "
+        "point data of .vtu, .vtp, .ply, .msh. Enough without a number of vertices, which then follows.",
+    ),
+]
+MinSize = Annotated[
+    str | None,
+    input_option(metavar="LENGTH", help="With sizes of --metric-file: raise smaller ones to this, such as 0.2 or 1%."),
+]
+MaxSize = Annotated[
+    str | None, input_option(metavar="LENGTH", help="With sizes of --metric-file: lower larger ones to this.")
+]
+Gradation = Annotated[
+    float | None,
+    input_option(
+        callback=positive,
+        metavar="X",
+        help="With sizes of --metric-file: the most that they differ by over a distance of 1; larger are lowered.",
+    ),
+]
+AdaptedTo = Annotated[
+    str | None,
+    input_option(
+        metavar="[FILE:]FIELD",
+        help="Adapt the mesh to this field at the vertices of IN, or of another mesh of the surface: small and "
+        "stretched triangles where the field bends. With -n or --ratio.",
+    ),
+]
+NormOfAdaption = Annotated[
+    str | None,
+    input_option(
+        metavar="P",
+        help="With --adapt-to: the L^p norm in which the error is to be small, a number of at least 1, or inf.",
+        show_default="2",
+    ),
+]

@@ -16,9 +16,16 @@ import typer
 from anisomesh.cli.arguments import (
     DEFAULT_OPTIONS,
     REMESH_OPTIONS,
+    AdaptedTo,
+    Gradation,
+    MaxSize,
+    MetricFileName,
+    MinSize,
+    NormOfAdaption,
     Quiet,
     Ratio,
     Vertices,
+    Workers,
     length,
     takes_remesh_options,
     target_option,
@@ -61,21 +68,19 @@ def command(
     edge_length: Annotated[
         str | None, target_option(metavar="LENGTH", help="As many vertices as edges of this length take.")
     ] = None,
+    metric_file: MetricFileName = None,
+    min_size: MinSize = None,
+    max_size: MaxSize = None,
+    gradation: Gradation = None,
+    adapt_to: AdaptedTo = None,
+    norm: NormOfAdaption = None,
     weld: Annotated[
         str | None, typer.Option(metavar="LENGTH", help="Join points of the inputs up to this distance, or auto.")
     ] = None,
     output_format: Annotated[
         str | None, typer.Option(metavar="FORMAT", help="Format of the meshes to write; by default of each input.")
     ] = None,
-    workers: Annotated[
-        int | None,
-        typer.Option(
-            min=0,
-            metavar="N",
-            help="Processes, one thread each (extra: batch); 0 for none but this one.",
-            show_default="one per core",
-        ),
-    ] = None,
+    workers: Workers = None,
     scheduler: Annotated[
         str | None,
         typer.Option(metavar="ADDRESS", help="Scheduler of a running Dask cluster, such as tcp://host:8786."),
@@ -94,9 +99,9 @@ def command(
 
     Give -n, --ratio, --max-error or --edge-length, or a manifest whose rows do. Exit code 3 if some meshes failed.
     """
-    from anisomesh.batch.engine import WorkerPool
     from anisomesh.batch.places import is_address
     from anisomesh.batch.running import Settings
+    from anisomesh.execution.engine import WorkerPool
 
     out = out.removeprefix("file://")
     if is_address(out) and results is None:
@@ -104,13 +109,15 @@ def command(
     if output_format is not None:
         check_format(output_format, "--output-format")
     targets = {"n_vertices": n_vertices, "ratio": ratio, "max_error": max_error, "edge_length": edge_length}
-    for name in ("max_error", "edge_length"):
-        if (text := targets[name]) is not None:
-            length(str(text), f"--{name.replace('_', '-')}")
+    fields = {"metric_file": metric_file, "adapt_to": adapt_to, "norm": norm}
+    limits = {"min_size": min_size, "max_size": max_size}
+    for name, text in {"max_error": max_error, "edge_length": edge_length, **limits}.items():
+        if text is not None:
+            length(text, f"--{name.replace('_', '-')}")
     if weld not in (None, "auto"):
         length(str(weld), "--weld")
     given = {name: value for name, value in options.items() if value != getattr(DEFAULT_OPTIONS, name)}
-    given |= {"threads": threads, "weld_tolerance": weld} | targets
+    given |= {"threads": threads, "weld_tolerance": weld, "gradation": gradation} | targets | fields | limits
     jobs = _jobs(sources or [], manifest, {k: v for k, v in given.items() if v is not None}, output_format, Path(out))
     settings = Settings(
         workers=WorkerPool(count=workers, scheduler=scheduler),
@@ -129,8 +136,10 @@ def _jobs(
 
     if not sources and manifest is None:
         raise typer.BadParameter("name meshes, folders or patterns, or a --manifest")
-    if not options.keys() & {"n_vertices", "ratio", "max_error", "edge_length"} and sources:
-        raise typer.BadParameter("give one of -n (number of vertices), --ratio, --max-error and --edge-length")
+    if not options.keys() & {"n_vertices", "ratio", "max_error", "edge_length", "metric_file"} and sources:
+        raise typer.BadParameter(
+            "give one of -n (number of vertices), --ratio, --max-error and --edge-length, or --metric-file"
+        )
     listed = [] if manifest is None else read_manifest(manifest, options, output_format=output_format)
     return [*listed, *jobs_of(sources, options, output_format=output_format, without=out)]
 

@@ -39,6 +39,15 @@ def command(
             help="Run only this ratio (result vertices per input vertex), not all of the suite; repeatable.",
         ),
     ] = None,
+    workers: Annotated[
+        int | None,
+        typer.Option(
+            min=0,
+            metavar="N",
+            help="Processes (extra: batch), of which several slow each other; 0 for none but this one.",
+            show_default="1, or 0 without the extra",
+        ),
+    ] = None,
     show_list: Annotated[bool, typer.Option("--list", help="List the suites and exit.")] = False,
     quiet: Annotated[bool, typer.Option("--quiet", "-q", help="No progress.")] = False,
 ) -> None:
@@ -56,8 +65,10 @@ def command(
         wanted = replace(wanted, ratios=tuple(ratios))
     from anisomesh.bench.runs import run_suite
     from anisomesh.bench.tables import markdown, web_page
+    from anisomesh.execution.engine import WorkerPool, has_dask
     from anisomesh.io.atomic import atomic_path
 
+    pool = WorkerPool(count=int(has_dask()) if workers is None else workers)
     with progress(quiet) as display:
         announce_compilation(display, "remesh", "evaluate")
     out.mkdir(parents=True, exist_ok=True)
@@ -67,6 +78,7 @@ def command(
         stem.with_suffix(".jsonl"),
         data=data,
         items=items,
+        workers=pool,
         on_row=lambda step: None if quiet else _print(step),
         on_epoch=lambda text: None if quiet else print(text, file=sys.stderr, flush=True),
     )

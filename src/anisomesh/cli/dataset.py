@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
+from anisomesh.cli.arguments import Workers
 from anisomesh.cli.log import logs
 from anisomesh.cli.progress import announce_compilation, progress
 from anisomesh.cli.report import counted, table
@@ -56,23 +57,25 @@ def build_command(
     validation: Annotated[
         float, typer.Option(min=0.0, max=0.9, help="Share of the shape families for validation.")
     ] = 0.12,
-    workers: Annotated[int, typer.Option(min=1, help="Number of meshes processed in parallel.")] = 2,
+    workers: Workers = None,
     quiet: Annotated[bool, typer.Option("--quiet", "-q", help="No progress.")] = False,
 ) -> None:
     """Build a data set from the meshes in SRC. A stopped build is resumed by the same command."""
+    from anisomesh.execution.engine import WorkerPool
     from anisomesh.learn.data.build import build
     from anisomesh.learn.data.sources import sources_of
     from anisomesh.pipeline import remesh
 
     if no_variants and variant:
         raise typer.BadParameter("give either --variant or --no-variants")
+    pool = WorkerPool(count=workers)
     variants = () if no_variants else tuple(kind for kind in VARIANTS if kind in (variant or VARIANTS))
     recipe = Recipe(target=target, variants=variants, evening=evening)
     sources = sources_of(source, blobs, parts, validation=validation)
     with progress(quiet) as display:
         announce_compilation(display, "remesh")
     on_row = _ignore if quiet else _print
-    rows = build(sources, out, recipe, remesh, workers=workers, on_row=on_row)
+    rows = build(sources, out, recipe, remesh, workers=pool, on_row=on_row)
     typer.echo(_summary(rows))
 
 

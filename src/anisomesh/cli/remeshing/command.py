@@ -11,10 +11,16 @@ import typer
 
 from anisomesh.cli.arguments import (
     REMESH_OPTIONS,
+    AdaptedTo,
+    Gradation,
+    MaxSize,
+    MetricFileName,
+    MinSize,
+    NormOfAdaption,
     Quiet,
     Source,
+    input_option,
     length,
-    positive,
     share,
     takes_remesh_options,
     target_option,
@@ -22,14 +28,13 @@ from anisomesh.cli.arguments import (
 from anisomesh.cli.job import STANDARD_STREAM, Outputs, check_input_format, default_output, read_mesh, run_remesh
 from anisomesh.cli.progress import progress
 from anisomesh.cli.remeshing.levels import LevelOutputs, levels_summary, run_levels, targets_of
-from anisomesh.cli.remeshing.prescribed_metric import MetricFile, check_limits, file_of, prescribed_metric
+from anisomesh.cli.remeshing.prescribed_metric import check_limits, file_of, prescribed_metric
 from anisomesh.cli.report import as_json, hints, summary
 
 if TYPE_CHECKING:
     from anisomesh.mesh.surface import Surface
 
 _output = partial(typer.Option, rich_help_panel="Output")
-_input = partial(typer.Option, rich_help_panel="Input")
 
 
 @takes_remesh_options(*REMESH_OPTIONS)
@@ -82,77 +87,44 @@ def command(
         ),
     ] = None,
     input_format: Annotated[
-        str | None, _input(metavar="FORMAT", help="Format of IN, if its suffix does not name it: ply, obj, ...")
+        str | None, input_option(metavar="FORMAT", help="Format of IN, if its suffix does not name it: ply, obj, ...")
     ] = None,
     output_format: Annotated[
         str | None, _output(metavar="FORMAT", help="Format of OUT, if its suffix does not name it.")
     ] = None,
     features: Annotated[
         Path | None,
-        _input(metavar="FILE", help="Edges to keep: a text file, two vertex numbers of IN per line, from 0."),
+        input_option(metavar="FILE", help="Edges to keep: a text file, two vertex numbers of IN per line, from 0."),
     ] = None,
     keep_points: Annotated[
         Path | None,
-        _input(
+        input_option(
             metavar="FILE", help="Vertices to keep where they are: a text file, a vertex number of IN per line, from 0."
         ),
     ] = None,
     lock: Annotated[
         list[str] | None,
-        _input(
+        input_option(
             metavar="REGION",
             help="Leave the triangles of this region of IN as they are, by its name or label; may be repeated.",
         ),
     ] = None,
     density: Annotated[
         Path | None,
-        _input(
+        input_option(
             metavar="FILE",
             help="Weights of the vertices of IN, larger for smaller triangles: a text file, one number per line.",
         ),
     ] = None,
-    metric_file: Annotated[
-        str | None,
-        _input(
-            metavar="FILE[:NAME]",
-            help="Lengths of edges, or metric tensors, at the points of IN, in model units: .sol, .solb, .npy, or "
-            "point data of .vtu, .vtp, .ply, .msh. Enough without a number of vertices, which then follows.",
-        ),
-    ] = None,
-    min_size: Annotated[
-        str | None,
-        _input(metavar="LENGTH", help="With sizes of --metric-file: raise smaller ones to this, such as 0.2 or 1%."),
-    ] = None,
-    max_size: Annotated[
-        str | None, _input(metavar="LENGTH", help="With sizes of --metric-file: lower larger ones to this.")
-    ] = None,
-    gradation: Annotated[
-        float | None,
-        _input(
-            callback=positive,
-            metavar="X",
-            help="With sizes of --metric-file: the most that they differ by over a distance of 1; larger are lowered.",
-        ),
-    ] = None,
-    adapt_to: Annotated[
-        str | None,
-        _input(
-            metavar="[FILE:]FIELD",
-            help="Adapt the mesh to this field at the vertices of IN, or of another mesh of the surface: small and "
-            "stretched triangles where the field bends. With -n or --ratio.",
-        ),
-    ] = None,
-    norm: Annotated[
-        str | None,
-        _input(
-            metavar="P",
-            help="With --adapt-to: the L^p norm in which the error is to be small, a number of at least 1, or inf.",
-            show_default="2",
-        ),
-    ] = None,
+    metric_file: MetricFileName = None,
+    min_size: MinSize = None,
+    max_size: MaxSize = None,
+    gradation: Gradation = None,
+    adapt_to: AdaptedTo = None,
+    norm: NormOfAdaption = None,
     weld: Annotated[
         str | None,
-        _input(
+        input_option(
             metavar="LENGTH",
             help="Join points of the input up to this distance, in model units or % of the diagonal; auto: 0.001%.",
         ),
@@ -233,7 +205,7 @@ def command(
         if prescribed is not None:
             display.note(prescribed.description)
             options |= prescribed.options_for(mesh, str(source))
-        with prescribed.named_in_errors() if isinstance(prescribed, MetricFile) else nullcontext():
+        with nullcontext() if prescribed is None else prescribed.named_in_errors():
             run: Any = run_levels if n_levels else run_remesh
             result, facts = run(mesh, display, name=str(source), load_seconds=seconds, **options)
         first = result[0] if n_levels else result

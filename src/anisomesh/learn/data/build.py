@@ -1,16 +1,17 @@
-"""Build a data set: many shapes in parallel, each in a process of its own. A stopped build can be resumed."""
+"""Build a data set of many shapes, in parallel if there are workers. A stopped build can be resumed."""
 
 from __future__ import annotations
 
 import json
-from collections.abc import Callable, Iterator
-from concurrent.futures import FIRST_COMPLETED, Future, ThreadPoolExecutor, wait
+from collections.abc import Callable
+from contextlib import closing
+from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
 
-from anisomesh.errors import AnisomeshError, OptionError
-from anisomesh.execution.isolation import isolated
+from anisomesh.errors import AnisomeshError
+from anisomesh.execution.engine import Work, WorkerPool
 from anisomesh.io.atomic import atomic_path
 from anisomesh.io.meshes import load
 from anisomesh.io.results.json_lines import append_line, drop_cut_line
@@ -30,7 +31,7 @@ def build(
     recipe: Recipe,
     remesher: Remesher,
     *,
-    workers: int = 2,
+    workers: WorkerPool | None = None,
     on_row: Callable[[ManifestRow, int, int], None] = lambda row, number, total: None,
 ) -> list[ManifestRow]:
     """Make the missing items of a data set and return the rows of all sources, in their order.
@@ -47,7 +48,7 @@ def build(
     remesher
         Makes meshes even, and stretched.
     workers
-        Number of sources processed in parallel, each in a process of its own.
+        What processes the sources; by default this process, which a crash would end.
     on_row
         Called with each new row, its number, and the number of new rows in total.
 
@@ -69,8 +70,6 @@ def build(
     -----
     Processes are spawned, so a script that calls this needs ``if __name__ == "__main__"``.
     """
-    if workers < 1:
-        raise OptionError(f"workers = {workers}; expected at least 1")
     require_packages(recipe)
     out.mkdir(parents=True, exist_ok=True)
     starts = {source.name: _start(source, recipe) for source in sources}
@@ -82,14 +81,14 @@ def build(
             Path(temporary).write_text("".join(map(_line, known.values())), encoding="utf-8")
     drop_cut_line(out / MANIFEST)
     jobs = [source for source in sources if not _is_done(known.get(source.name), starts[source.name], out)]
-
-    def work(source: Source) -> ManifestRow:
-        return _row_in_new_process(source, out, recipe, remesher)
-
-    for number, (source, row) in enumerate(_in_parallel(jobs, work, workers), 1):
-        known[source.name] = {**starts[source.name], **row}
-        append_line(out / MANIFEST, _line(known[source.name]).rstrip())
-        on_row(known[source.name], number, len(jobs))
+    tasks = [_Task(source, out.absolute(), recipe, remesher) for source in jobs]
+    with closing((workers or WorkerPool(count=0)).run(Work(do=_row), tasks)) as outcomes:
+        for number, outcome in enumerate(outcomes, 1):
+            source = jobs[outcome.number]
+            row = outcome.result or {"status": "failed", "reason": outcome.error}
+            known[source.name] = {**starts[source.name], **row}
+            append_line(out / MANIFEST, _line(known[source.name]).rstrip())
+            on_row(known[source.name], number, len(jobs))
     return [known[name] for name in starts]
 
 
@@ -125,31 +124,20 @@ def _is_done(row: ManifestRow | None, start: ManifestRow, out: Path) -> bool:
     return all((out / item["file"]).is_file() for item in row.get("items", []))
 
 
-def _in_parallel(
-    jobs: list[Source], work: Callable[[Source], ManifestRow], workers: int
-) -> Iterator[tuple[Source, ManifestRow]]:
-    """Yield sources with their rows as they finish; at most twice as many as there are workers are queued at a time."""
-    waiting: dict[Future[ManifestRow], Source] = {}
-    left = iter(jobs)
-    with ThreadPoolExecutor(workers) as pool:
-        try:
-            while True:
-                for source in left:
-                    waiting[pool.submit(work, source)] = source
-                    if len(waiting) == 2 * workers:
-                        break
-                if not waiting:
-                    return
-                for future in wait(waiting, return_when=FIRST_COMPLETED).done:
-                    yield waiting.pop(future), future.result()
-        finally:
-            pool.shutdown(cancel_futures=True)
+@dataclass(frozen=True)
+class _Task:
+    """A source for a worker, and how its items are made."""
+
+    source: Source
+    out: Path
+    recipe: Recipe
+    remesher: Remesher
 
 
-def _row_in_new_process(source: Source, out: Path, recipe: Recipe, remesher: Remesher) -> ManifestRow:
-    """Make the items of a source in a new process and return their part of its row; an exception becomes a reason."""
+def _row(task: _Task, attempt: int) -> ManifestRow:
+    """Make the items of a source and return their part of its row; an exception becomes a reason."""
     try:
-        return isolated(make)(source, out, recipe, remesher)
+        return make(task.source, task.out, task.recipe, task.remesher)
     except UnsuitableError as error:
         return {"status": "dropped", "reason": str(error)}
     except Exception as error:  # one bad mesh must not end a build of hundreds

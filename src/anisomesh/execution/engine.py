@@ -1,4 +1,4 @@
-"""Engines: what runs the tasks of a batch and yields what became of them, in the order in which they end."""
+"""Engines: what runs many tasks and yields what became of them, in the order in which they end."""
 
 from __future__ import annotations
 
@@ -89,7 +89,7 @@ class WorkerPool:
         if self.in_this_process:
             yield from _one_after_the_other(work, tasks)
             return
-        from anisomesh.batch.cluster import run_on_cluster
+        from anisomesh.execution.cluster import run_on_cluster
 
         yield from run_on_cluster(work, tasks, count=self.count, scheduler=self.scheduler)
 

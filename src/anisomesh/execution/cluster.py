@@ -16,8 +16,8 @@ from functools import cache
 from pathlib import Path
 from typing import Any
 
-from anisomesh.batch.engine import MAX_TRIES, Outcome, Work, usable_cores
 from anisomesh.errors import AnisomeshError
+from anisomesh.execution.engine import MAX_TRIES, Outcome, Work, usable_cores
 
 logger = logging.getLogger(__name__)
 
@@ -32,7 +32,8 @@ _LOCAL_CONFIG = {
     "distributed.worker.memory.spill": False,
     "distributed.worker.memory.pause": False,  # a paused worker would keep its task forever
     "distributed.worker.memory.terminate": 0.95,
-    "distributed.worker.preload": ["anisomesh.batch.worker"],
+    "distributed.worker.preload": ["anisomesh.execution.worker"],
+    "distributed.deploy.lost-worker-timeout": "1 day",  # it would end parents whose processes start slowly
     "distributed.comm.timeouts.connect": _SECONDS_TO_CONNECT,
 }
 
