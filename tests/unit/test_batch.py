@@ -6,6 +6,7 @@ import json
 import re
 from pathlib import Path
 
+import numpy as np
 import pytest
 
 from anisomesh.batch import Job, Settings, WorkerPool, run
@@ -108,6 +109,12 @@ def test_faults_of_jobs_are_found_before_any_work(meshes, tmp_path):
         ([Job(input=a, output="x.ply", options={"max_error": "1 mm"})], "a.obj: max_error 1 mm: expected a length"),
         ([Job(input=a, output="x.ply", options={**TARGET, "density": [1.0, 2.0]})], "expected the name of a text file"),
         ([Job(input=a, output="x.ply", options={**TARGET, "metric": [1, 2]})], "expected the name of a metric"),
+        ([Job(input=a, output="x.ply", options={"metric_file": "no.npy"})], "no such file: .*no.npy"),
+        ([Job(input=a, output="x.ply", options={"metric_file": a, "adapt_to": "u"})], "give one of them"),
+        ([Job(input=a, output="x.ply", options={"adapt_to": "u", "edge_length": 1.0})], "n_vertices or ratio with it"),
+        ([Job(input=a, output="x.ply", options={**TARGET, "min_size": 1.0})], "only sizes can be limited"),
+        ([Job(input=a, output="x.ply", options={"metric_file": a, "gradation": -1.0})], "gradation = -1"),
+        ([Job(input=a, output="x.ply", options={**TARGET, "norm": 2})], "norm goes with adapt_to"),
         (
             [Job(input=a, output="x.ply", options={**TARGET, "density": str(tmp_path / "no.txt")})],
             "no such file: .*no.tx",
@@ -159,6 +166,23 @@ def test_the_key_depends_on_all_that_the_result_does_and_nothing_else(meshes, tm
     assert len({first, key(base), *changed}) == 2 + len(changed)
 
 
+def test_the_key_depends_on_the_field_that_prescribes_the_metric_and_not_on_its_place(meshes, tmp_path):
+    source, sizes, other = str(meshes / "a.obj"), tmp_path / "sizes.npy", tmp_path / "other.npy"
+
+    def key(**options):
+        (job,) = checked([Job(input=source, output="a.ply", options=options)], str(tmp_path))
+        return key_of(job, facts_of_files(job))
+
+    for values in ([1.0, 2.0], [1.0, 3.0]):
+        np.save(sizes, values)
+        other.write_bytes(sizes.read_bytes())
+        assert key(metric_file=str(sizes)) == key(metric_file=str(other))
+    different = [key(metric_file=str(sizes)), key(metric_file=f"{sizes}:x"), key(metric_file=str(sizes), max_size=2.0)]
+    np.save(sizes, [1.0, 4.0])
+    different += [key(metric_file=str(sizes)), key(n_vertices=9, adapt_to="u"), key(n_vertices=9, adapt_to="v")]
+    assert len({*different, key(n_vertices=9, adapt_to=f"{sizes}:u")}) == 7
+
+
 def test_a_file_with_the_stamp_of_before_is_not_read_again(meshes, monkeypatch):
     job = Job(input=str(meshes / "a.obj"), output="a.ply", options=TARGET)
     before = facts_of_files(job)
@@ -198,6 +222,14 @@ def test_both_kinds_of_manifest_say_the_same(meshes, tmp_path):
         ("in/sub/a.ply", {"max_error": "0.1%", "seed": 5, "density": str(tmp_path / "w.txt")}),
     ]
     assert {Path(job.input) for job in found[0]} == {Path(job.input) for job in jobs(meshes)}
+
+
+def test_a_row_replaces_the_metric_of_the_command_and_names_files_beside_the_manifest(meshes, tmp_path):
+    rows = [{"input": "in/a.obj", "metric_file": "m.sol:1"}, {"input": "in/b.obj", "adapt_to": "u", "norm": 4}]
+    for path in manifest(tmp_path, rows):
+        first, second = read_manifest(path, {**TARGET, "metric": "approximation"})
+        assert first.options == {**TARGET, "metric_file": f"{tmp_path / 'm.sol'}:1"}
+        assert second.options == {**TARGET, "adapt_to": "u", "norm": 4}
 
 
 @pytest.mark.parametrize(
@@ -320,6 +352,25 @@ def test_refusals_errors_and_warnings_are_in_the_row(meshes, tmp_path, monkeypat
     with (meshes / "a.obj").open("a") as file:
         file.write("f 1 2\n")
     assert any("a.obj" in line for line in row("a.obj")["log"])
+
+
+def test_a_job_follows_the_sizes_of_its_metric_file(meshes, tmp_path):
+    n_points = load(meshes / "a.obj").n_points
+
+    def row(**options):
+        job = Job(input=str(meshes / "a.obj"), output="x.off", options={**FAST, "n_vertices": None, **options})
+        (job,) = checked([job], str(tmp_path))
+        return do(BatchTask(job=job, target=str(tmp_path / "x.off")))
+
+    np.save(tmp_path / "sizes.npy", np.full(n_points, 0.4))
+    file = str(tmp_path / "sizes.npy")
+    counts = [row(metric_file=file, **more)["report"]["vertices"] for more in ({}, {"max_size": 0.3})]
+    assert counts[1] > 1.3 * counts[0]
+    np.save(tmp_path / "sizes.npy", np.full(n_points, -1.0))
+    refused = row(metric_file=file)
+    assert refused["status"] == "refused"
+    assert "sizes.npy" in refused["error"]
+    assert "no field 'u'" in row(adapt_to="u", n_vertices=30)["error"]
 
 
 def test_in_this_process_errors_are_outcomes():

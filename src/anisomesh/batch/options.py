@@ -171,7 +171,8 @@ def _read(name: str, value: Any) -> Any:
     items = value if isinstance(value, list | tuple) else [value]
     is_name = name in (*TABLES, *FIELDS)
     if not all(isinstance(item, str if is_name else str | int | float) for item in items):
-        expected = "the name of a file" if is_name else "a number, a text, true or false"
+        kind = "text file" if name in TABLES else "file or field"
+        expected = f"the name of a {kind}" if is_name else "a number, a text, true or false"
         raise OptionError(f"{name} is of type {type(value).__name__}; expected {expected}")
     if not isinstance(value, str) or is_name:
         return value
