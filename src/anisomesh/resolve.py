@@ -29,7 +29,7 @@ _NEAREST_DECIMATION = FitOptions(price=10.0, exchange_price=2.0, rounds=3, min_q
 _ITERATIONS, _ITERATIONS_BEFORE_FIT = 150, 50  # of L-BFGS at most; the second from training meshes
 _WARM_LLOYD, _WARM_ITERATIONS = 2, 24  # the same from sites of a finer level of detail; chosen on training meshes
 _WARM_SPREADING, _WARM_CREASE_ROUNDS = 2, 1  # the same
-_WARM_SAMPLES = 30  # per vertex in the fit then, on a measured surface; a part has fillets that fewer miss
+_WARM_SAMPLES = 25  # per vertex in the fit then, on a measured surface; a part has fillets that fewer miss
 _BUILT_IN: dict[str, Callable[[float], MetricSource]] = {
     "curvature": lambda crease_angle: Curvature(crease_angle=crease_angle),
     "approximation": lambda crease_angle: Approximation(crease_angle=crease_angle),

@@ -115,10 +115,10 @@ def test_a_killed_benchmark_goes_on(run_cli, tmp_path):
 def test_other_options_are_run_again(tmp_path):
     run_suite(suite(), tmp_path / "rows")
     steps = []
-    run_suite(suite(), tmp_path / "rows", on_row=steps.append)
+    run_suite(suite(), tmp_path / "rows", on_step=steps.append)
     assert not steps
     changed = {**OURS, "options": {**OURS["options"], "max_iterations": 4}}
-    rows = run_suite(suite(methods=[changed]), tmp_path / "rows", on_row=steps.append)
+    rows = run_suite(suite(methods=[changed]), tmp_path / "rows", on_step=steps.append)
     assert len(steps) == 1
     assert rows[0]["options"]["max_iterations"] == 4
     assert rows[0]["facts"]["iterations"] == 4
@@ -152,7 +152,7 @@ def test_methods_get_disturbed_meshes_and_are_compared_with_the_clean_one(tmp_pa
     (tmp_path / "older").write_text(json.dumps(older) + "\n")
     steps = []
     read = run_suite(
-        suite(shapes=["sphere:640"], methods=three_methods(three)), tmp_path / "older", on_row=steps.append
+        suite(shapes=["sphere:640"], methods=three_methods(three)), tmp_path / "older", on_step=steps.append
     )
     assert not steps
     assert read[0]["evaluation"]["validity"] == rows[0]["evaluation"]["validity"]
@@ -250,22 +250,23 @@ def test_a_suite_trains_the_networks_that_it_compares(tmp_path, item_folder):
     with pytest.raises(OptionError, match="name a data set with --items"):
         run_suite(wanted, tmp_path / "rows.jsonl")
     told, steps = [], []
-    rows = run_suite(wanted, tmp_path / "rows.jsonl", items=item_folder, on_epoch=told.append)
+    rows = run_suite(wanted, tmp_path / "rows.jsonl", items=item_folder, on_step=told.append)
     assert [row["status"] for row in rows] == ["done", "done"]
-    assert [text.split(",")[0] for text in told] == [
+    assert [step.split(",")[0] for step in told if isinstance(step, str)] == [
         "ours 1: epoch 1 of 2",
         "ours 1: epoch 2 of 2",
         "theirs: epoch 1 of 1",
     ]
     folders = [path.parent.name for path in (tmp_path / "rows").glob("*/weights.safetensors")]
     assert sorted(name.rpartition("-")[0] for name in folders) == ["ours-1", "theirs"]
-    run_suite(wanted, tmp_path / "rows.jsonl", on_row=steps.append)
+    run_suite(wanted, tmp_path / "rows.jsonl", on_step=steps.append)
     assert not steps
     told.clear()
     changed = suite(shapes=["ring:100"], methods=[ours, {**theirs, "training": {**paper, "rate": 1e-3}}])
-    run_suite(changed, tmp_path / "rows.jsonl", items=item_folder, on_row=steps.append, on_epoch=told.append)
-    assert [text.split(",")[0] for text in told] == ["theirs: epoch 1 of 1"]  # and not a refusal to go on
-    assert [step.row["method"] for step in steps] == ["theirs"]
+    run_suite(changed, tmp_path / "rows.jsonl", items=item_folder, on_step=told.append)
+    line, step = told
+    assert line.split(",")[0] == "theirs: epoch 1 of 1"  # and not a refusal to go on
+    assert step.row["method"] == "theirs"
     wrong = suite(methods=[{**ours, "training": {"epoch": 2}}])
     with pytest.raises(OptionError, match="did you mean 'epochs'"):
         run_suite(wrong, tmp_path / "others.jsonl", items=item_folder)

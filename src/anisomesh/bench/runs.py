@@ -47,8 +47,7 @@ def run_suite(
     data: Path | None = None,
     items: Path | None = None,
     workers: WorkerPool | None = None,
-    on_row: Callable[[SuiteProgress], None] = lambda progress: None,
-    on_epoch: Callable[[str], None] = lambda text: None,
+    on_step: Callable[[SuiteProgress | str], None] = lambda step: None,
 ) -> list[RunRow]:
     """Run all runs of a suite that a file of rows lacks, and return all rows.
 
@@ -66,10 +65,8 @@ def run_suite(
     workers
         What does the runs; by default this process. A library that crashes ends a worker, and its run with it; several
         workers make each other slower.
-    on_row
-        Called after every run.
-    on_epoch
-        Called with a line of text after every epoch of a training.
+    on_step
+        Called after every run, and with a line of text after every epoch of a training.
 
     Returns
     -------
@@ -92,8 +89,8 @@ def run_suite(
     drop_cut_line(out)
     known = {_key(row): row for row in read_rows(out)}
     jobs = [job for job in _jobs(suite, inputs) if not _is_done(known.get(job.key), job)]
-    weights = train_networks(suite, out.with_suffix(""), items, on_epoch) if jobs else {}
-    tasks = [_Task(job, suite, weights.get(job.method.name)) for job in jobs]
+    weights = train_networks(suite, out.with_suffix(""), items, on_step) if jobs else {}
+    tasks = [_RunTask(job, suite, weights.get(job.method.name)) for job in jobs]
     start = time.monotonic()
     with closing((workers or WorkerPool(count=0)).run(_WORK, tasks)) as outcomes:
         for number, outcome in enumerate(outcomes, 1):
@@ -103,7 +100,7 @@ def run_suite(
                 append_line(out, as_line(row))
             known[job.key] = row
             left = (time.monotonic() - start) / number * (len(jobs) - number)
-            on_row(SuiteProgress(row, number, len(jobs), left))
+            on_step(SuiteProgress(row, number, len(jobs), left))
     return [known[job.key] for job in _jobs(suite, inputs)]
 
 
@@ -159,7 +156,7 @@ class _Job:
 
 
 @dataclass(frozen=True)
-class _Task:
+class _RunTask:
     """A job for a worker, and the weights of its network, None for none."""
 
     job: _Job
@@ -200,7 +197,7 @@ def _is_done(row: RunRow | None, job: _Job) -> bool:
     return row is not None and row["options"] == job.start["options"]
 
 
-def _do(task: _Task, attempt: int) -> RunRow:
+def _do(task: _RunTask, attempt: int) -> RunRow:
     """Return the row of a run."""
     job, suite = task.job, task.suite
     remesher = METHODS[job.method.method]

@@ -16,12 +16,6 @@ import typer
 from anisomesh.cli.arguments import (
     DEFAULT_OPTIONS,
     REMESH_OPTIONS,
-    AdaptedTo,
-    Gradation,
-    MaxSize,
-    MetricFileName,
-    MinSize,
-    NormOfAdaption,
     Quiet,
     Ratio,
     Vertices,
@@ -32,6 +26,14 @@ from anisomesh.cli.arguments import (
 )
 from anisomesh.cli.job import check_format
 from anisomesh.cli.progress import Display, announce_compilation, progress
+from anisomesh.cli.remeshing.field_options import (
+    AdaptedTo,
+    Gradation,
+    MaxSize,
+    MetricFileName,
+    MinSize,
+    NormOfAdaption,
+)
 from anisomesh.options import MAX_THREADS
 
 if TYPE_CHECKING:

@@ -79,8 +79,7 @@ def command(
         data=data,
         items=items,
         workers=pool,
-        on_row=lambda step: None if quiet else _print(step),
-        on_epoch=lambda text: None if quiet else print(text, file=sys.stderr, flush=True),
+        on_step=lambda step: None if quiet else _print(step),
     )
     chart = _chart(wanted, rows)
     texts = {".svg": chart} if chart else {}
@@ -103,7 +102,10 @@ def _chart(suite: Suite, rows: list[RunRow]) -> str:
         return ""
 
 
-def _print(step: SuiteProgress) -> None:
+def _print(step: SuiteProgress | str) -> None:
+    if isinstance(step, str):
+        print(step, file=sys.stderr, flush=True)
+        return
     row = step.row
     name = f"{Path(row['mesh']).name[:32]:<32} {row['ratio']:>4.0%} {row['input']:<9} {row['method']:<20}"
     if row["status"] == "done":

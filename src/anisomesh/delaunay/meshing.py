@@ -13,10 +13,11 @@ from anisomesh.delaunay.dual import dual_mesh
 from anisomesh.delaunay.faults import points_at_faults
 from anisomesh.delaunay.feature_mesh import FeatureMesh, edges_left, renumbered
 from anisomesh.delaunay.placement import place_vertices
+from anisomesh.delaunay.search_trees import SearchTrees
 from anisomesh.delaunay.topology_control import ControlledCells, control_topology
 from anisomesh.execution.deadline import NO_DEADLINE, Deadline
 from anisomesh.features.network import FeatureNetwork
-from anisomesh.mesh.closest_points import ClosestPoints, SearchTrees
+from anisomesh.mesh.closest_points import ClosestPoints
 from anisomesh.mesh.surface import Surface
 from anisomesh.mesh.validity import faulty_faces
 from anisomesh.meshops.anchoring.anchored import anchored
@@ -161,8 +162,7 @@ def mesh_from_sites(task: MeshingTask, sites: Sites) -> ValidMesh:
        times. The result has more vertices in all only if that makes it valid.
 
     If step 1 or 2 fails (a tube thinner than the distance between sites), the surface is coarsened by the same
-    collapses. The paper adds sites for every defect and optimises again, which makes new ones. Every step is bounded,
-    and steps 4 to 7 keep the topology change by change, so the result is a manifold with the topology of the surface.
+    collapses. Every step is bounded, and steps 4 to 7 keep the topology, so the result is a manifold with its topology.
 
     References
     ----------
@@ -204,9 +204,8 @@ def _attempt(task: MeshingTask, controlled: ControlledCells, dual: FeatureMesh |
     if len(points) < task.n_vertices:
         kept = np.concatenate([mesh.crease_edges, task.anchors.outline_in(Surface(points, faces))])
         points, faces = split_longest_edges(points, faces, task.n_vertices, task.reference, roots, kept=kept)
-    none = np.zeros(len(points), dtype=bool)
-    tries = _MAX_TRIES if dual is not None else _MAX_TRIES_COARSENED
-    points, faces, creases = _without_crossings(task, FeatureMesh(points, faces, mesh.crease_edges, none), tries)
+    found = FeatureMesh(points, faces, mesh.crease_edges, np.zeros(len(points), dtype=bool))
+    points, faces, creases = _without_crossings(task, found, _MAX_TRIES if dual is not None else _MAX_TRIES_COARSENED)
     return ValidMesh(
         points=points,
         faces=faces,

@@ -189,21 +189,6 @@ class ClosestPoints:
         )
 
 
-class SearchTrees:
-    """Closest points of surfaces, each built when it is first asked for and kept."""
-
-    def __init__(self) -> None:
-        self._known: list[ClosestPoints] = []
-
-    def of(self, surface: Surface) -> ClosestPoints:
-        """Return the closest points of a surface."""
-        for known in self._known:
-            if known.surface is surface:
-                return known
-        self._known.append(ClosestPoints(surface))
-        return self._known[-1]
-
-
 def barycentric(corners: npt.NDArray[np.float64], points: Points) -> npt.NDArray[np.float64]:
     """Return barycentric coordinates (n, 3) of points (n, 3) in triangles (n, 3, 3), one point for each triangle.
 

@@ -11,6 +11,7 @@ from anisomesh._arrays import CornerTensors, EdgeMask, PointMask, PointScalars, 
 from anisomesh.cvt.coarsening import spread_subset
 from anisomesh.cvt.lbfgs import Optimised
 from anisomesh.delaunay.meshing import MeshingTask
+from anisomesh.delaunay.search_trees import SearchTrees
 from anisomesh.embedding.base import Embedding
 from anisomesh.embedding.density import area_factors, density_of_sizes
 from anisomesh.embedding.embedder import checked_embedding
@@ -19,7 +20,6 @@ from anisomesh.features.detect import sharp_edges
 from anisomesh.features.network import FeatureNetwork, trace_features
 from anisomesh.fitting.fit import FitPlan
 from anisomesh.fitting.target import FitTarget
-from anisomesh.mesh.closest_points import SearchTrees
 from anisomesh.mesh.embedded_surface import EmbeddedSurface
 from anisomesh.mesh.surface import Surface
 from anisomesh.metric.field import MetricField

@@ -11,12 +11,6 @@ import typer
 
 from anisomesh.cli.arguments import (
     REMESH_OPTIONS,
-    AdaptedTo,
-    Gradation,
-    MaxSize,
-    MetricFileName,
-    MinSize,
-    NormOfAdaption,
     Quiet,
     Source,
     input_option,
@@ -27,6 +21,14 @@ from anisomesh.cli.arguments import (
 )
 from anisomesh.cli.job import STANDARD_STREAM, Outputs, check_input_format, default_output, read_mesh, run_remesh
 from anisomesh.cli.progress import progress
+from anisomesh.cli.remeshing.field_options import (
+    AdaptedTo,
+    Gradation,
+    MaxSize,
+    MetricFileName,
+    MinSize,
+    NormOfAdaption,
+)
 from anisomesh.cli.remeshing.levels import LevelOutputs, levels_summary, run_levels, targets_of
 from anisomesh.cli.remeshing.prescribed_metric import check_limits, file_of, prescribed_metric
 from anisomesh.cli.report import as_json, hints, summary

@@ -81,7 +81,7 @@ def build(
             Path(temporary).write_text("".join(map(_line, known.values())), encoding="utf-8")
     drop_cut_line(out / MANIFEST)
     jobs = [source for source in sources if not _is_done(known.get(source.name), starts[source.name], out)]
-    tasks = [_Task(source, out.absolute(), recipe, remesher) for source in jobs]
+    tasks = [_SourceTask(source, out.absolute(), recipe, remesher) for source in jobs]
     with closing((workers or WorkerPool(count=0)).run(Work(do=_row), tasks)) as outcomes:
         for number, outcome in enumerate(outcomes, 1):
             source = jobs[outcome.number]
@@ -125,7 +125,7 @@ def _is_done(row: ManifestRow | None, start: ManifestRow, out: Path) -> bool:
 
 
 @dataclass(frozen=True)
-class _Task:
+class _SourceTask:
     """A source for a worker, and how its items are made."""
 
     source: Source
@@ -134,7 +134,7 @@ class _Task:
     remesher: Remesher
 
 
-def _row(task: _Task, attempt: int) -> ManifestRow:
+def _row(task: _SourceTask, attempt: int) -> ManifestRow:
     """Make the items of a source and return their part of its row; an exception becomes a reason."""
     try:
         return make(task.source, task.out, task.recipe, task.remesher)
