@@ -21,8 +21,13 @@ import numpy as np
 import anisomesh
 from anisomesh import RemeshResult, StepInfo, Surface
 from anisomesh.bench.inputs import make_shape
+from anisomesh.evaluation.shape import quality_in_metric, reference_metric
+from anisomesh.mesh.distance import surface_distance
+from anisomesh.mesh.geometry import unit_frame
+from anisomesh.repair.prepare import prepare
 
 OPTIONS = {"threads": 1}
+SAMPLES = 100_000
 SHAPES = ["ring:6000", "part:6000"]
 
 
@@ -59,10 +64,20 @@ def surface_of(name: str) -> Surface:
     return anisomesh.load(name) if Path(name).exists() else make_shape(name)
 
 
-def figures(result: RemeshResult) -> tuple[float, float, int]:
-    """Return G, root mean squared distance at bounding-box diagonal 1, and faults."""
-    found = anisomesh.evaluate(result.prepared, result.surface)
-    return found.shape.g_mean, found.distance.rms, found.validity.faults
+class Ruler:
+    """What results are measured against: the prepared input at bounding-box diagonal 1, and its metric."""
+
+    def __init__(self, given: Surface) -> None:
+        prepared = prepare(given).surface
+        self.frame = unit_frame(prepared.points)
+        self.surface = prepared.with_points(self.frame.to_unit(prepared.points))
+        self.metric = reference_metric(self.surface)
+
+    def figures(self, result: RemeshResult) -> tuple[float, float, int]:
+        """Return G, root mean squared distance, and faults."""
+        mesh = Surface(self.frame.to_unit(result.surface.points), result.surface.faces)
+        distance = surface_distance(self.surface, mesh, samples=SAMPLES)
+        return float(quality_in_metric(*self.metric, mesh).mean()), distance.rms, result.validity.faults
 
 
 def mean(values: list[float]) -> float:
@@ -89,17 +104,18 @@ def main() -> None:
     print("| mesh | vertices | s | over the finest | G, level | G, alone | RMS, level | over alone | faults | alone |")
     print("|" + "---|" * 10)
     for name in options.meshes:
-        surface, clock = surface_of(name), Clock()
+        surface = surface_of(name)
+        ruler, clock = Ruler(surface), Clock()
         n = options.points or surface.n_points
         counts = [max(4, round(ratio * n)) for ratio in options.ratios]
         levels = anisomesh.remesh_levels(surface, n_vertices=counts, on_step=clock, **given)
         clock.stop()
         costs.append(sum(clock.seconds) / clock.seconds[0])
         for k, level in enumerate(levels):
-            g, rms, faults = figures(level)
+            g, rms, faults = ruler.figures(level)
             asked = level.vertices_asked
             alone = [
-                figures(anisomesh.remesh(surface, n_vertices=asked, seed=seed, **given) if k else level)
+                ruler.figures(anisomesh.remesh(surface, n_vertices=asked, seed=seed, **given) if k else level)
                 for seed in (options.seeds if k else options.seeds[:1])
             ]
             g_alone, rms_alone = float(np.mean([each[0] for each in alone])), mean([each[1] for each in alone])

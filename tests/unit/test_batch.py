@@ -373,6 +373,25 @@ def test_a_job_follows_the_sizes_of_its_metric_file(meshes, tmp_path):
     assert "no field 'u'" in row(adapt_to="u", n_vertices=30)["error"]
 
 
+def test_levels_of_detail_are_one_job_that_is_done_if_all_its_files_are_there(meshes, tmp_path):
+    options = {**FAST, "n_vertices": None, "ratios": "60% 0.3"}
+    job, other = (Job(input=str(meshes / f"{name}.obj"), output=f"{name}.off", options=options) for name in "ab")
+    (row,) = run([job], tmp_path / "out", settings=HERE)
+    assert row["status"] == "done", row
+    counts = [load(tmp_path / f"out/a.lod{k}.off").n_points for k in (0, 1)]
+    assert counts == [level["vertices"] for level in row["report"]["levels"]]
+    assert counts[0] == row["report"]["vertices"] > counts[1]
+    assert run([job], tmp_path / "out", settings=HERE) == [row]
+    (tmp_path / "out/a.lod1.off").unlink()
+    assert run([job], tmp_path / "out", settings=HERE) != [row]
+    assert (tmp_path / "out/a.lod1.off").exists()
+    taken = Job(input=other.input, output="a.lod1.off", options=TARGET)
+    with pytest.raises(OptionError, match=r"both be written to a\.lod1\.off"):
+        checked([job, taken], str(tmp_path))
+    with pytest.raises(OptionError, match="give one of"):
+        checked([Job(input=job.input, output="a.off", options={**TARGET, "ratios": [0.5]})], str(tmp_path))
+
+
 def test_in_this_process_errors_are_outcomes():
     outcomes = list(WorkerPool(count=0).run(Work(do=lambda task, attempt: 1 / task), [2, 0, 4]))
     assert outcomes == [Outcome(0, 0.5), Outcome(1, error="ZeroDivisionError: division by zero"), Outcome(2, 0.25)]

@@ -10,6 +10,7 @@ from anisomesh.batch.options import FIELDS, TABLES, Options, file_and_field, pla
 from anisomesh.batch.places import absolute, exists, is_address, joined, suffix_of
 from anisomesh.errors import OptionError
 from anisomesh.io.known_formats import MESH_FORMATS
+from anisomesh.levels.files import level_paths
 
 _MISSING_SHOWN = 5  # missing files that a message names
 
@@ -26,13 +27,22 @@ class Job:
         The file to write, whose suffix is its format; relative to the folder of the batch, or absolute, or an address.
     options
         Keywords of :func:`anisomesh.pipeline.remesh` with plain values: ``n_vertices``, ``ratio`` (also ``"20%"``),
-        ``max_error`` or ``edge_length`` (also ``"0.1%"`` of the diagonal), and others; of ``features``, ``keep_points``
-        and ``density`` the names of text files. ``metric_file``, ``adapt_to`` and ``norm`` are as on the command line.
+        ``ratios`` for levels of detail, ``max_error`` or ``edge_length`` (also ``"0.1%"`` of the diagonal), and others;
+        of ``features``, ``keep_points`` and ``density`` the names of text files. ``metric_file``, ``adapt_to`` and
+        ``norm`` are as on the command line.
     """
 
     input: str
     output: str
     options: Options = field(default_factory=dict)
+
+    @property
+    def outputs(self) -> list[str]:
+        """The files that are written: the output, or ``out.lod0.ply``, ``out.lod1.ply``, ... for levels of detail."""
+        if "ratios" not in self.options:
+            return [self.output]
+        above, name = self.output[: -len(Path(self.output).name)], Path(self.output).name
+        return [above + path.name for path in level_paths(name, len(self.options["ratios"]))]
 
     @property
     def files(self) -> dict[str, str]:
@@ -92,15 +102,16 @@ def _check_outputs(jobs: Sequence[Job], folder: str) -> None:
     inputs = {_identity(job.input) for job in jobs}
     writers: dict[str, Job] = {}
     for job in jobs:
-        output = _identity(joined(folder, job.output))
-        if output in inputs:
-            raise OptionError(f"{job.output} is an input and would be overwritten; choose another folder or name")
-        first = writers.setdefault(output, job)
-        if first is not job:
-            raise OptionError(
-                f"{first.input} and {job.input} would both be written to {job.output}; give them outputs of their own, "
-                "in a manifest, or name a folder that contains both"
-            )
+        for name in job.outputs:
+            output = _identity(joined(folder, name))
+            if output in inputs:
+                raise OptionError(f"{name} is an input and would be overwritten; choose another folder or name")
+            first = writers.setdefault(output, job)
+            if first is not job:
+                raise OptionError(
+                    f"{first.input} and {job.input} would both be written to {name}; give them outputs of their "
+                    "own, in a manifest, or name a folder that contains both"
+                )
 
 
 def _identity(place: str) -> str:

@@ -8,7 +8,7 @@ from dataclasses import fields
 from typing import TYPE_CHECKING, Any
 
 from anisomesh._values import Length
-from anisomesh.counts.target import read_target
+from anisomesh.counts.target import read_levels, read_target
 from anisomesh.errors import OptionError
 from anisomesh.options import RemeshOptions, with_overrides
 from anisomesh.toml import check_keys
@@ -16,8 +16,8 @@ from anisomesh.toml import check_keys
 if TYPE_CHECKING:
     from anisomesh.metric.prescribed import AdaptTo, MetricFile
 
-TARGETS = ("n_vertices", "ratio", "max_error", "edge_length")
-"""Options that say how many vertices a result has; a job has one of them."""
+TARGETS = ("n_vertices", "ratio", "max_error", "ratios", "edge_length")
+"""Options that say how many vertices a result has; a job has one of them, ``ratios`` for levels of detail."""
 TABLES = ("features", "keep_points", "density")
 """Options whose value is the name of a text file with numbers for a mesh."""
 METRICS = ("metric", "metric_file", "adapt_to")
@@ -31,7 +31,7 @@ _OBJECTS = ("energy", "size_field")  # without a form in a file of jobs
 _WITHOUT_EFFECT = ("threads",)  # on the result
 OPTION_NAMES = tuple(
     name
-    for name in (*TARGETS[:3], *FIELDS, "norm", *(field.name for field in fields(RemeshOptions)))
+    for name in (*TARGETS[:4], *FIELDS, "norm", *(field.name for field in fields(RemeshOptions)))
     if name not in _OBJECTS
 )
 """Names that the options of a job can have: the keywords of a remesh that files can hold."""
@@ -70,10 +70,14 @@ def _check(options: Options) -> None:
     _check_metric(options)
     apart = (*TABLES, *FIELDS, "norm", *_LIMITS)
     keywords = {name: value for name, value in in_model_units(options, diagonal=1.0).items() if name not in apart}
-    target = {name: keywords.pop(name, None) for name in TARGETS[:3]}
+    target = {name: keywords.pop(name) for name in TARGETS[:4] if name in keywords}
     known = with_overrides(RemeshOptions(), keywords)
-    if "metric_file" not in options or any(value is not None for value in target.values()):
-        read_target(target["n_vertices"], target["ratio"], target["max_error"], known)
+    if len(target) > 1:
+        raise OptionError(f"give one of {', '.join(TARGETS)}")
+    if "ratios" in target:
+        read_levels(None, target["ratios"], known)
+    elif target or "metric_file" not in options:
+        read_target(target.get("n_vertices"), target.get("ratio"), target.get("max_error"), known)
     if known.has_tensors:
         raise OptionError(f"metric = {known.metric!r}; expected the name of a metric")
 
@@ -174,10 +178,20 @@ def _read(name: str, value: Any) -> Any:
         kind = "text file" if name in TABLES else "file or field"
         expected = f"the name of a {kind}" if is_name else "a number, a text, true or false"
         raise OptionError(f"{name} is of type {type(value).__name__}; expected {expected}")
+    if name == "ratios":
+        words = value.replace(",", " ").split() if isinstance(value, str) else items
+        return [_share(name, word) for word in words]
     if not isinstance(value, str) or is_name:
         return value
     if name == "ratio" and value.endswith("%"):
-        return float(Length.parse(value, name).value) / 100.0
+        return _share(name, value)
     if name in _LENGTHS and value != "auto" and not value.endswith("%"):
         return Length.parse(value, name).value
     return value
+
+
+def _share(name: str, value: Any) -> Any:
+    """Return a share, such as 0.2 or ``"20%"``, as a number."""
+    if not isinstance(value, str):
+        return value
+    return float(Length.parse(value, name).value) / (100.0 if value.endswith("%") else 1.0)

@@ -46,7 +46,8 @@ def write_page(rows: Sequence[Row], folder: Path, outputs: str) -> Path:
 def write_parquet(rows: Sequence[Row], folder: Path) -> Path | None:
     """Write the rows of a batch as a Parquet file and return its path; None if pyarrow is not installed.
 
-    Keys of nested figures are joined by points, such as ``report.validity.closed``; options are JSON texts.
+    Keys of nested figures are joined by points, such as ``report.validity.closed``; options and levels of
+    detail are JSON texts.
     """
     if importlib.util.find_spec("pyarrow") is None:
         return None
@@ -105,5 +106,7 @@ def _shown(value: float | None, form: str) -> str:
 def _flat(row: Row, before: str = "") -> Row:
     found: Row = {}
     for name, value in row.items():
+        if name == "levels":
+            value = json.dumps(value)
         found |= _flat(value, f"{before}{name}.") if isinstance(value, dict) else {f"{before}{name}": value}
     return found

@@ -89,7 +89,7 @@ def is_done(job: Job, row: Row | None, outputs: str) -> bool:
     outputs
         The folder, or the address of one, that outputs are relative to.
     """
-    if row is None or row["status"] != "done" or not exists(joined(outputs, job.output)):
+    if row is None or row["status"] != "done" or not all(exists(joined(outputs, name)) for name in job.outputs):
         return False
     try:
         return bool(key_of(job, facts_of_files(job, row["files"])) == row["key"])

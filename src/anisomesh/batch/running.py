@@ -136,7 +136,8 @@ class Batch:
         """
         tasks = [self._task(job) for job in self.left]
         self.results.forget([job.output for job in self.left])
-        remove_leftovers(Path(task.target) for task in tasks if not is_address(task.target))
+        targets = [joined(self._outputs, name) for job in self.left for name in job.outputs]
+        remove_leftovers(Path(target) for target in targets if not is_address(target))
         for job in self.left:
             picture_of(self.folder, job.output).unlink(missing_ok=True)
         if tasks:

@@ -83,6 +83,8 @@ def prepare_process() -> None:
 
 def _remesh(task: BatchTask, *, draw: bool) -> dict[str, Any]:
     from anisomesh.io.meshes import load_mesh, save
+    from anisomesh.levels.files import save_meshes
+    from anisomesh.levels.remesh import remesh_levels
     from anisomesh.pipeline import remesh
 
     with local_copy(task.job.input) as path:
@@ -90,13 +92,19 @@ def _remesh(task: BatchTask, *, draw: bool) -> dict[str, Any]:
     keywords, prescribed = for_mesh(task.job.options, mesh.surface.diagonal), prescribed_by(task.job.options)
     if prescribed is not None:
         keywords |= prescribed.options_for(mesh, task.job.input)
+    is_one = "ratios" not in keywords
     with nullcontext() if prescribed is None else prescribed.named_in_errors():
-        result = remesh(mesh, **keywords)
+        levels = [remesh(mesh, **keywords)] if is_one else remesh_levels(mesh, **keywords)
+    first = levels[0]
     with local_output(task.target) as path:
-        save(result.mesh, path)
+        if is_one:
+            save(first.mesh, path)
+        else:
+            save_meshes([level.mesh for level in levels], path)
     if draw and task.picture is not None:
-        _draw(result.surface, task.picture)
-    return result.report() | {"prepared": result.prepare_report.lines()}
+        _draw(first.surface, task.picture)
+    each = {} if is_one else {"levels": [level.report() for level in levels]}
+    return first.report() | {"prepared": first.prepare_report.lines()} | each
 
 
 def _draw(surface: Surface, picture: Path) -> None:

@@ -26,13 +26,15 @@ from anisomesh.cli.arguments import (
 )
 from anisomesh.cli.job import check_format
 from anisomesh.cli.progress import Display, announce_compilation, progress
-from anisomesh.cli.remeshing.field_options import (
+from anisomesh.cli.ratios import shares
+from anisomesh.cli.remeshing.shared_options import (
     AdaptedTo,
     Gradation,
     MaxSize,
     MetricFileName,
     MinSize,
     NormOfAdaption,
+    Ratios,
 )
 from anisomesh.options import MAX_THREADS
 
@@ -63,6 +65,7 @@ def command(
     ] = None,
     n_vertices: Vertices = None,
     ratio: Ratio = None,
+    ratios: Ratios = None,
     max_error: Annotated[
         str | None,
         target_option(metavar="LENGTH", help="As few vertices as keep within this distance, such as 0.2 or 0.1%."),
@@ -99,7 +102,7 @@ def command(
 ) -> None:
     """Remesh many meshes. A stopped batch is resumed by the same command, which does what is left.
 
-    Give -n, --ratio, --max-error or --edge-length, or a manifest whose rows do. Exit code 3 if some meshes failed.
+    Give -n, --ratio, --ratios, --max-error or --edge-length, or a manifest whose rows do. Exit code 3 if some failed.
     """
     from anisomesh.batch.places import is_address
     from anisomesh.batch.running import Settings
@@ -110,7 +113,8 @@ def command(
         raise typer.BadParameter(f"--out {out} is not on this machine; give --results DIR, a folder that is")
     if output_format is not None:
         check_format(output_format, "--output-format")
-    targets = {"n_vertices": n_vertices, "ratio": ratio, "max_error": max_error, "edge_length": edge_length}
+    counts = {"n_vertices": n_vertices, "ratio": ratio, "ratios": None if ratios is None else shares(ratios)}
+    targets = {**counts, "max_error": max_error, "edge_length": edge_length}
     fields = {"metric_file": metric_file, "adapt_to": adapt_to, "norm": norm}
     limits = {"min_size": min_size, "max_size": max_size}
     for name, text in {"max_error": max_error, "edge_length": edge_length, **limits}.items():
@@ -135,12 +139,13 @@ def _jobs(
 ) -> list[Job]:
     from anisomesh.batch.inputs import jobs_of
     from anisomesh.batch.manifest import read_manifest
+    from anisomesh.batch.options import TARGETS
 
     if not sources and manifest is None:
         raise typer.BadParameter("name meshes, folders or patterns, or a --manifest")
-    if not options.keys() & {"n_vertices", "ratio", "max_error", "edge_length", "metric_file"} and sources:
+    if not options.keys() & {*TARGETS, "metric_file"} and sources:
         raise typer.BadParameter(
-            "give one of -n (number of vertices), --ratio, --max-error and --edge-length, or --metric-file"
+            "give one of -n (number of vertices), --ratio, --ratios, --max-error and --edge-length, or --metric-file"
         )
     listed = [] if manifest is None else read_manifest(manifest, options, output_format=output_format)
     return [*listed, *jobs_of(sources, options, output_format=output_format, without=out)]

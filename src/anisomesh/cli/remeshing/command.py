@@ -21,16 +21,17 @@ from anisomesh.cli.arguments import (
 )
 from anisomesh.cli.job import STANDARD_STREAM, Outputs, check_input_format, default_output, read_mesh, run_remesh
 from anisomesh.cli.progress import progress
-from anisomesh.cli.remeshing.field_options import (
+from anisomesh.cli.remeshing.levels import LevelOutputs, levels_summary, run_levels, targets_of
+from anisomesh.cli.remeshing.prescribed_metric import check_limits, file_of, prescribed_metric
+from anisomesh.cli.remeshing.shared_options import (
     AdaptedTo,
     Gradation,
     MaxSize,
     MetricFileName,
     MinSize,
     NormOfAdaption,
+    Ratios,
 )
-from anisomesh.cli.remeshing.levels import LevelOutputs, levels_summary, run_levels, targets_of
-from anisomesh.cli.remeshing.prescribed_metric import check_limits, file_of, prescribed_metric
 from anisomesh.cli.report import as_json, hints, summary
 
 if TYPE_CHECKING:
@@ -55,14 +56,7 @@ def command(
             "--ratio", parser=share, metavar="SHARE", help="Vertices as a share of the input's, such as 0.2 or 20%."
         ),
     ] = None,
-    ratios: Annotated[
-        str | None,
-        target_option(
-            "--ratios",
-            metavar="R [R ...]",
-            help="Levels of detail, such as 1 0.5 0.2 0.05: each made from the next finer.",
-        ),
-    ] = None,
+    ratios: Ratios = None,
     max_error: Annotated[
         str | None,
         target_option(

@@ -1,11 +1,19 @@
-"""Options for a metric from fields at points, which commands share."""
+"""Options that ``remesh`` and ``batch`` share: levels of detail, and metrics from fields at points."""
 
 from __future__ import annotations
 
 from typing import Annotated
 
-from anisomesh.cli.arguments import input_option, positive
+from anisomesh.cli.arguments import input_option, positive, target_option
 
+Ratios = Annotated[
+    str | None,
+    target_option(
+        "--ratios",
+        metavar="R [R ...]",
+        help="Levels of detail, such as 1 0.5 0.2 0.05: each made from the next finer.",
+    ),
+]
 MetricFileName = Annotated[
     str | None,
     input_option(
