@@ -99,7 +99,8 @@ def arguments() -> argparse.Namespace:
 def main() -> None:
     options = arguments()
     given = {**OPTIONS, "embedding": options.embedding}
-    anisomesh.remesh_levels(make_shape("part:2000"), ratios=[0.5, 0.2], **given)  # compile
+    for shape in SHAPES:  # load or compile what is needed
+        anisomesh.remesh_levels(make_shape(shape), n_vertices=[500, 200], **given)
     costs, shares = [], defaultdict(list)
     print("| mesh | vertices | s | over the finest | G, level | G, alone | RMS, level | over alone | faults | alone |")
     print("|" + "---|" * 10)

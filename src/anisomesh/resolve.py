@@ -28,7 +28,6 @@ _NEAREST = FitOptions(price=4.0, exchange_price=0.25, rounds=5, share=0.1)  # ch
 _NEAREST_DECIMATION = FitOptions(price=10.0, exchange_price=2.0, rounds=3, min_quality=0.8)  # chosen on them too
 _ITERATIONS, _ITERATIONS_BEFORE_FIT = 150, 50  # of L-BFGS at most; the second from training meshes
 _WARM_LLOYD, _WARM_ITERATIONS = 2, 24  # the same from sites of a finer level of detail; chosen on training meshes
-_WARM_SPREADING, _WARM_CREASE_ROUNDS = 2, 1  # the same
 _WARM_SAMPLES = 25  # per vertex in the fit then, on a measured surface; a part has fillets that fewer miss
 _BUILT_IN: dict[str, Callable[[float], MetricSource]] = {
     "curvature": lambda crease_angle: Curvature(crease_angle=crease_angle),
@@ -184,23 +183,14 @@ def cvt_options(options: RemeshOptions, *, sized: bool = False, warm: bool = Fal
     resampling: Energy | None = wanted
     if isinstance(wanted, NormalMetric):
         resampling = None if sized or wanted.sharpness == 1.0 else NormalMetric(_RESAMPLING_FACTOR * wanted.sharpness)
-    found = CVTOptions(
+    return CVTOptions(
         energy=wanted,
         final_energy=None if final is None else NormalMetric(final),
         resampling_energy=resampling,
         relocate=follows_creases(options),
-        lloyd_iterations=options.lloyd_iterations,
-        max_iterations=_max_iterations(options),
+        lloyd_iterations=min(options.lloyd_iterations, _WARM_LLOYD) if warm else options.lloyd_iterations,
+        max_iterations=min(_max_iterations(options), _WARM_ITERATIONS) if warm else _max_iterations(options),
         seed=options.seed,
-    )
-    if not warm:
-        return found
-    return replace(
-        found,
-        lloyd_iterations=min(found.lloyd_iterations, _WARM_LLOYD),
-        max_iterations=min(found.max_iterations, _WARM_ITERATIONS),
-        spreading_steps=_WARM_SPREADING,
-        crease_rounds=_WARM_CREASE_ROUNDS,
     )
 
 

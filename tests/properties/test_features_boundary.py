@@ -183,7 +183,7 @@ def test_spread_sites_are_on_the_boundary_one_for_each_long_interval():
     sites = naive.random_sites(surface.points, surface.faces, 100, np.random.default_rng(0))
     none = np.zeros(len(embedded.surface.edges), dtype=bool)
     features = trace_features(embedded, 100, sharp=none)
-    spread = spread_on_features(features, voronoi, ConstrainedSites.free(lloyd(voronoi, sites, 5)), 5)
+    spread = spread_on_features(features, voronoi, ConstrainedSites.free(lloyd(voronoi, sites, 5)))
     positions, on_boundary = spread.positions, spread.on_boundary
     assert not spread.on_crease.any()
     assert np.all(distance_to_boundary(positions[on_boundary], surface) < 1e-12)

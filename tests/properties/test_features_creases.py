@@ -101,7 +101,7 @@ def test_intervals_divide_the_creases_among_the_nearest_sites(name, n_sites):
 def test_spread_sites_are_on_creases_and_at_corners():
     voronoi, sites, features = crease_case("box", 150)
     points = voronoi.embedded.points
-    spread = spread_on_features(features, voronoi, ConstrainedSites.free(lloyd(voronoi, sites, 5)), 5)
+    spread = spread_on_features(features, voronoi, ConstrainedSites.free(lloyd(voronoi, sites, 5)))
     assert not spread.on_boundary.any()
     low, high = points.min(axis=0), points.max(axis=0)
     on_sides = (np.minimum(np.abs(spread.positions - low), np.abs(spread.positions - high)) < 1e-12).sum(axis=1)

@@ -21,6 +21,8 @@ from anisomesh.voronoi.intervals import (
 )
 from anisomesh.voronoi.restricted import RestrictedVoronoi
 
+_SPREADING_STEPS = 5  # Lloyd steps that spread the sites along features; heuristic
+
 Mask = npt.NDArray[np.bool_]
 
 
@@ -74,10 +76,10 @@ def snap_to_features(features: FeatureNetwork, voronoi: RestrictedVoronoi, sites
 
 
 def spread_on_features(
-    features: FeatureNetwork, voronoi: RestrictedVoronoi, sites: ConstrainedSites, steps: int
+    features: FeatureNetwork, voronoi: RestrictedVoronoi, sites: ConstrainedSites
 ) -> ConstrainedSites:
     """Return the sites after a few steps of Lloyd's algorithm, along the features and elsewhere."""
-    for _ in range(steps):
+    for _ in range(_SPREADING_STEPS):
         sites = snap_to_features(features, voronoi, sites)
         sites = sites.moved(lloyd(voronoi, sites.positions, 1, fixed=sites.fixed))
     return snap_to_features(features, voronoi, sites)

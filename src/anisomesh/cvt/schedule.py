@@ -21,6 +21,7 @@ from anisomesh.voronoi.diagram import Diagram
 from anisomesh.voronoi.restricted import RestrictedVoronoi
 
 _RELOCATE_AT = 0.6  # share of the iterations after which sites are relocated; heuristic
+_FIRST_CREASE_ROUNDS = 3  # in which sites are brought to creases at the start; later in one; heuristic
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -39,10 +40,6 @@ class CVTOptions:
         Whether sites are moved to places that the dual mesh misses; needs feedback of the dual.
     lloyd_iterations, max_iterations
         Steps of Lloyd's algorithm at the start, and the bound on iterations of L-BFGS.
-    spreading_steps
-        Steps of Lloyd's algorithm that spread sites along features, before each run of L-BFGS.
-    crease_rounds
-        Rounds in which sites are brought to creases that lack some, before the first of these runs; then it is one.
     seed
         Seed of the random start.
     """
@@ -53,8 +50,6 @@ class CVTOptions:
     relocate: bool = True
     lloyd_iterations: int = 9
     max_iterations: int = 150
-    spreading_steps: int = 5
-    crease_rounds: int = 3
     seed: int = 0
 
     @property
@@ -134,11 +129,7 @@ def optimise_sites(
             errors = feedback.squared_errors(voronoi.diagram(sites.positions))
             if errors is not None:
                 sites = relocate_to_missed_points(voronoi, sites, energy, errors)
-        if features.any:
-            sites = spread_on_features(features, voronoi, sites, options.spreading_steps)
-        if feedback is not None:
-            rounds = options.crease_rounds if stage == 0 else 1
-            sites = _brought_to_creases(voronoi, sites, features, energy, feedback, rounds)
+        sites = _settle_on_features(voronoi, sites, features, energy, feedback, first=stage == 0)
         result = minimise(
             voronoi,
             sites.positions,
@@ -173,17 +164,21 @@ def _start(
     )
 
 
-def _brought_to_creases(
+def _settle_on_features(
     voronoi: RestrictedVoronoi,
     sites: ConstrainedSites,
     features: FeatureNetwork,
     energy: Energy,
-    feedback: DualFeedback,
-    rounds: int,
+    feedback: DualFeedback | None,
+    *,
+    first: bool,
 ) -> ConstrainedSites:
-    """Return the sites after rounds of relocation to creases that lack some."""
-    for _ in range(rounds if features.creases.n_polylines else 0):
-        missing = feedback.missing_on_creases(features, voronoi.diagram(sites.positions))
-        sites = relocate_to_creases(voronoi, sites, energy, missing)
-        sites = snap_to_features(features, voronoi, sites)
+    """Return the sites spread along the features, after rounds of relocation to creases that lack some."""
+    if features.any:
+        sites = spread_on_features(features, voronoi, sites)
+    if feedback is not None and features.creases.n_polylines:
+        for _ in range(_FIRST_CREASE_ROUNDS if first else 1):
+            missing = feedback.missing_on_creases(features, voronoi.diagram(sites.positions))
+            sites = relocate_to_creases(voronoi, sites, energy, missing)
+            sites = snap_to_features(features, voronoi, sites)
     return sites
