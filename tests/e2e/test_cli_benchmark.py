@@ -63,7 +63,7 @@ def test_smoke_suite_runs_and_ours_are_valid_and_in_the_order_of_the_paper(run_c
     ]
     smaller = replace(given, shapes=("part:300", "ring:300"), methods=tuple(shorter))  # half the points
     monkeypatch.setattr("anisomesh.bench.suite.load_suite", {"smoke": smaller}.get)
-    done = run_cli("benchmark", "smoke", "-o", tmp_path, "--quiet")
+    done = run_cli("benchmark", "smoke", "-o", tmp_path, "--workers", 0, "--quiet")
     assert done.returncode == 0, done.stderr
     rows = read_rows(tmp_path / "smoke.jsonl")
     assert {row["status"] for row in rows} <= {"done", "absent"}
@@ -84,7 +84,7 @@ def test_smoke_suite_runs_and_ours_are_valid_and_in_the_order_of_the_paper(run_c
 @pytest.mark.slow
 def test_one_ratio_of_a_suite(run_cli, tmp_path):
     (tmp_path / "two.toml").write_text(TOML)
-    done = run_cli("benchmark", tmp_path / "two.toml", "-o", tmp_path, "--ratio", 0.3, "--quiet")
+    done = run_cli("benchmark", tmp_path / "two.toml", "-o", tmp_path, "--ratio", 0.3, "--workers", 0, "--quiet")
     assert (done.returncode, done.stderr) == (0, "")
     assert {row["ratio"] for row in read_rows(tmp_path / "two.jsonl")} == {0.3}
     assert run_cli("benchmark", tmp_path / "two.toml", "-o", tmp_path, "--ratio", -1).returncode == 2

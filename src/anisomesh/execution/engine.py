@@ -86,6 +86,8 @@ class WorkerPool:
 
     def run(self, work: Work, tasks: Sequence[Any]) -> Generator[Outcome]:
         """Yield the outcomes of tasks, begun in this order, as they end; closing the iterator ends local workers."""
+        if not tasks:
+            return
         if self.in_this_process:
             yield from _one_after_the_other(work, tasks)
             return
