@@ -28,7 +28,7 @@ _NEAREST = FitOptions(price=4.0, exchange_price=0.25, rounds=5, share=0.1)  # ch
 _NEAREST_DECIMATION = FitOptions(price=10.0, exchange_price=2.0, rounds=3, min_quality=0.8)  # chosen on them too
 _ITERATIONS, _ITERATIONS_BEFORE_FIT = 150, 50  # of L-BFGS at most; the second from training meshes
 _WARM_LLOYD, _WARM_ITERATIONS = 2, 24  # the same from sites of a finer level of detail; chosen on training meshes
-_WARM_SAMPLES = 25  # per vertex in the fit then, on a measured surface; a part has fillets that fewer miss
+_WARM_SAMPLES = 25  # per vertex in the fit then, on measured surfaces; parts have fillets that fewer miss
 _BUILT_IN: dict[str, Callable[[float], MetricSource]] = {
     "curvature": lambda crease_angle: Curvature(crease_angle=crease_angle),
     "approximation": lambda crease_angle: Approximation(crease_angle=crease_angle),
@@ -142,7 +142,7 @@ def fit_plan(options: RemeshOptions, surface: Surface, *, nearest: bool = False,
     With the metric for the least distance the error counts more than by default, and on a designed surface a decimation
     is fitted; so it is on any surface if a distance is what is asked for (``nearest``). Prescribed sizes and a density
     say where points go, so none are exchanged and nothing is decimated, and an own energy has the last word. From sites
-    of a finer level of detail (``warm``) fewer sweeps are enough, and on a measured surface fewer samples.
+    of a finer level of detail (``warm``) fewer sweeps and samples are enough on a measured surface.
     """
     if not is_fitted(options):
         return None
@@ -150,7 +150,8 @@ def fit_plan(options: RemeshOptions, surface: Surface, *, nearest: bool = False,
     least_distance = nearest or named or isinstance(options.metric, Approximation)
     chosen, decimation = _NEAREST if least_distance else FitOptions(), None
     sized = prescribes_sizes(options) and not nearest
-    if warm:
+    shorter = warm and not is_designed(surface)
+    if shorter:
         chosen = replace(chosen, first_sweeps=2, round_sweeps=1)
     if options.density is not None or sized:
         chosen = replace(chosen, rounds=0)
@@ -163,7 +164,7 @@ def fit_plan(options: RemeshOptions, surface: Surface, *, nearest: bool = False,
         mesh=chosen.weighted(weight),
         decimation=None if decimation is None else decimation.weighted(weight),
         relative=sized,
-        samples_per_vertex=_WARM_SAMPLES if warm and not is_designed(surface) else SAMPLES_PER_VERTEX,
+        samples_per_vertex=_WARM_SAMPLES if shorter else SAMPLES_PER_VERTEX,
         threads=options.threads,
     )
 
