@@ -57,12 +57,16 @@ class MadeMesh:
 def valid_mesh(task: MeshTask, options: RemeshOptions, run: Run) -> MadeMesh | None:
     """Return the mesh of a task; from other random starts while it has faults that the input does not explain.
 
-    None if its sheets cannot be joined.
+    So is another Euler characteristic of joined sheets than the one of the input. None if its sheets cannot be joined.
     """
     best = made = _mesh_of_start(task, options, run)
     first = options.seed + (task.start is None)
+
+    def badness(made: MadeMesh) -> tuple[bool, int]:
+        return (False, made.validity.faults) if task.join is None else made.validity.badness
+
     for seed in range(first, first + MAX_STARTS - 1):
-        if best is None or made is None or not best.validity.faults or run.deadline.passed():
+        if best is None or made is None or badness(best) == (False, 0) or run.deadline.passed():
             break
         if task.join is not None and best.validity.faults > MAX_FAULTS:
             break
@@ -70,7 +74,7 @@ def valid_mesh(task: MeshTask, options: RemeshOptions, run: Run) -> MadeMesh | N
             break
         fresh = replace(task.dual, voronoi=RestrictedVoronoi(task.dual.voronoi.embedded, threads=options.threads))
         made = _mesh_of_start(replace(task, dual=fresh, start=None), replace(options, seed=seed), run)
-        if made is not None and made.validity.faults < best.validity.faults:
+        if made is not None and badness(made) < badness(best):
             best = made
     return best
 
