@@ -41,7 +41,7 @@ from anisomesh.setup.inputs import prepared_input, with_split_sides
 from anisomesh.setup.lock import Cut, cut_locked
 from anisomesh.setup.measured import count_for_length, unit_of_lengths
 from anisomesh.setup.tasks import Finer, Tasks, set_up
-from anisomesh.starts import MadeMesh, MeshTask, valid_mesh
+from anisomesh.starts import SOUND, MadeMesh, MeshTask, badness, valid_mesh
 
 logger = logging.getLogger(__name__)
 
@@ -205,14 +205,14 @@ def joined_or_apart(
     best, fresh = first, replace(manner, finer=None)
     for way in ({"connected": True}, {"joined": False}):
         late = run.deadline.share(OPTIMISATION_SHARE).passed()
-        if best is not None and (late or best.result.validity.badness == (False, 0)):
+        if best is not None and (late or badness(best.result.validity) == SOUND):
             break
         if "connected" in way and (late or not cut.locked.any()):
             continue
         logger.info("the sheets cannot be joined well with %d vertices; remeshing with %s", n, way)
         other = cut_input(given, options, run, **way)
         made = _remesh(other, n, options, run, fresh) if "joined" in way or other.least <= n else None
-        if made is not None and (best is None or made.result.validity.badness < best.result.validity.badness):
+        if made is not None and (best is None or badness(made.result.validity) < badness(best.result.validity)):
             best = made
     if best is None:
         raise AssertionError("a mesh without junctions was not joined")

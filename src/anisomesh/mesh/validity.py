@@ -75,12 +75,6 @@ class Validity:
         """Number of inverted and flat triangles and of new intersections, which a remesh is to avoid."""
         return self.inverted + self.new_intersections + self.flat
 
-    @property
-    def badness(self) -> tuple[bool, int]:
-        """Whether the topology is another one than the input's, and :attr:`faults`: smaller is better."""
-        found = self.euler, self.components, self.boundary_loops
-        return found != (self.euler_input, self.components_input, self.boundary_loops_input), self.faults
-
     def as_dict(self) -> dict[str, Any]:
         """Return a dictionary of all fields, for JSON."""
         return asdict(self)
