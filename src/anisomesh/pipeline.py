@@ -41,7 +41,7 @@ from anisomesh.setup.inputs import prepared_input, with_split_sides
 from anisomesh.setup.lock import Cut, cut_locked
 from anisomesh.setup.measured import count_for_length, unit_of_lengths
 from anisomesh.setup.tasks import Finer, Tasks, set_up
-from anisomesh.starts import MadeMesh, MeshTask, valid_mesh
+from anisomesh.starts import SOUND, MadeMesh, MeshTask, badness, valid_mesh
 
 logger = logging.getLogger(__name__)
 
@@ -164,10 +164,13 @@ def remesh(
     return with_attributes(result, given, cut, options, run) if options.attributes else result
 
 
-def cut_input(given: Mesh, options: RemeshOptions, run: Run, *, joined: bool = True) -> Cut:
-    """Return the prepared mesh without what is locked, cut at its junctions if sheets are to be joined there."""
+def cut_input(given: Mesh, options: RemeshOptions, run: Run, *, joined: bool = True, connected: bool = False) -> Cut:
+    """Return the prepared mesh without what is locked, cut at its junctions if sheets are to be joined there.
+
+    If ``connected``, junctions that are connected to locked faces keep all edges.
+    """
     with run.stage("prepare"):
-        return cut_locked(prepared_input(given, options, joined=joined), given, options)
+        return cut_locked(prepared_input(given, options, joined=joined), given, options, connected=connected)
 
 
 def with_attributes(result: RemeshResult, given: Mesh, cut: Cut, options: RemeshOptions, run: Run) -> RemeshResult:
@@ -190,21 +193,30 @@ def with_attributes(result: RemeshResult, given: Mesh, cut: Cut, options: Remesh
 def joined_or_apart(
     given: Mesh, cut: Cut, n: int, options: RemeshOptions, run: Run, manner: Manner = _PLAIN
 ) -> RemeshedLevel:
-    """Remesh a prepared surface with n vertices, its sheets joined at junctions; apart if that has fewer faults."""
-    junctions, joined = cut.rest.junctions, None
+    """Remesh a prepared surface with n vertices, its sheets joined at junctions; apart if that has fewer faults.
+
+    Where sheets cannot be joined beside locked faces, they are if the junctions that these touch stay as they are.
+    """
+    junctions, first = cut.rest.junctions, None
     if junctions is None or cut.locked.any() or are_resolved(junctions, cut.count_of_rest(n)):
-        joined = _remesh(cut, n, options, run, manner)
-    if joined is not None:
+        first = _remesh(cut, n, options, run, manner)
+        if first is not None and junctions is None:
+            return first
+    best, fresh = first, replace(manner, finer=None)
+    for way in ({"connected": True}, {"joined": False}):
         late = run.deadline.share(OPTIMISATION_SHARE).passed()
-        if junctions is None or not joined.result.validity.faults or late:
-            return joined
-    logger.info("the sheets cannot be joined well with %d vertices, and are remeshed apart", n)
-    apart = _remesh(cut_input(given, options, run, joined=False), n, options, run, replace(manner, finer=None))
-    if apart is None:
+        if best is not None and (late or badness(best.result.validity) == SOUND):
+            break
+        if "connected" in way and (late or not cut.locked.any()):
+            continue
+        logger.info("the sheets cannot be joined well with %d vertices; remeshing with %s", n, way)
+        other = cut_input(given, options, run, **way)
+        made = _remesh(other, n, options, run, fresh) if "joined" in way or other.least <= n else None
+        if made is not None and (best is None or badness(made.result.validity) < badness(best.result.validity)):
+            best = made
+    if best is None:
         raise AssertionError("a mesh without junctions was not joined")
-    if joined is None or apart.result.validity.faults < joined.result.validity.faults:
-        return replace(apart, finer=None if joined is None else joined.finer)
-    return joined
+    return best if best is first else replace(best, finer=None if first is None else first.finer)
 
 
 def _remesh(cut: Cut, n: int, options: RemeshOptions, run: Run, manner: Manner) -> RemeshedLevel | None:

@@ -42,6 +42,10 @@ class MeshTask:
     start: Sites | None = None
 
 
+SOUND = False, 0
+"""The badness of a mesh without faults."""
+
+
 @dataclass(frozen=True, kw_only=True, eq=False)
 class MadeMesh:
     """A mesh, whether its sheets are joined, its distance from prescribed edges, its sites and their seed."""
@@ -54,15 +58,26 @@ class MadeMesh:
     joined: bool
 
 
+def badness(validity: Validity) -> tuple[bool, int]:
+    """Return whether joined sheets have another topology than the input, and their number of faults."""
+    found = validity.euler, validity.components, validity.boundary_loops
+    wanted = validity.euler_input, validity.components_input, validity.boundary_loops_input
+    return found != wanted, validity.faults
+
+
 def valid_mesh(task: MeshTask, options: RemeshOptions, run: Run) -> MadeMesh | None:
     """Return the mesh of a task; from other random starts while it has faults that the input does not explain.
 
-    None if its sheets cannot be joined.
+    So is another Euler characteristic of joined sheets than the one of the input. None if its sheets cannot be joined.
     """
     best = made = _mesh_of_start(task, options, run)
     first = options.seed + (task.start is None)
+
+    def how_bad(made: MadeMesh) -> tuple[bool, int]:
+        return (False, made.validity.faults) if task.join is None else badness(made.validity)
+
     for seed in range(first, first + MAX_STARTS - 1):
-        if best is None or made is None or not best.validity.faults or run.deadline.passed():
+        if best is None or made is None or how_bad(best) == SOUND or run.deadline.passed():
             break
         if task.join is not None and best.validity.faults > MAX_FAULTS:
             break
@@ -70,7 +85,7 @@ def valid_mesh(task: MeshTask, options: RemeshOptions, run: Run) -> MadeMesh | N
             break
         fresh = replace(task.dual, voronoi=RestrictedVoronoi(task.dual.voronoi.embedded, threads=options.threads))
         made = _mesh_of_start(replace(task, dual=fresh, start=None), replace(options, seed=seed), run)
-        if made is not None and made.validity.faults < best.validity.faults:
+        if made is not None and how_bad(made) < how_bad(best):
             best = made
     return best
 

@@ -25,10 +25,11 @@ def folder(tmp_path):
 @pytest.mark.parametrize(("source", "field"), [("solved.vtu", "u"), ("plain.stl", "solved.vtu:u")])
 def test_triangles_are_narrow_in_the_layer(run_cli, folder, source, field):
     process = run_cli(
-        "remesh", source, "-n", 200, "--adapt-to", field, "--norm", "2", "-o", "a.vtu", "--json", cwd=folder
+        "remesh", source, "-n", 200, "--adapt-to", field, "--norm", "2", "-o", "a.vtu", "--report", "a.json", cwd=folder
     )
     assert process.returncode == 0, process.stderr
-    options = json.loads(process.stdout)["options"]
+    assert f"metric of the field {field}" in process.stdout
+    options = json.loads((folder / "a.json").read_text(encoding="utf-8"))["options"]
     assert (options["adapt_to"], options["norm"]) == (field, "2")
     mesh = load_mesh(folder / "a.vtu").surface
     assert mesh.n_points == 200

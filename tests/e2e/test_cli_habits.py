@@ -47,6 +47,21 @@ def test_a_ratio_that_is_none_is_refused(run, part, ratio, words):
         assert words in done.stderr
 
 
+@pytest.mark.parametrize(
+    ("words", "message"),
+    [
+        (["--ratios", 0.5, "20%", "abc"], "--ratios: 'abc' is not a share such as 0.2, or 20%"),
+        (["--ratios", 0.5, "--seed", 1, "abc"], "extra argument(s) (abc) after --seed 1"),
+        (["-n", 200, 100], "extra argument(s) (100) after -n 200"),
+        (["--lock", "a", "b", "c", "-n", 50], "extra argument(s) (b c) after --lock a"),
+    ],
+)
+def test_a_word_too_many_is_reported_with_the_option_that_it_follows(run, part, words, message):
+    done = run("remesh", part, *words)
+    assert done.returncode == 2
+    assert message in done.stderr
+
+
 @pytest.mark.parametrize("sharpness", ["-3", "0.5", "inf", "nan"])
 def test_a_sharpness_out_of_range_gets_the_same_answer_whatever_it_is(run, part, sharpness):
     for option in ("--sharpness", "--final-sharpness"):

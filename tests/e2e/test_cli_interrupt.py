@@ -46,18 +46,36 @@ def test_interrupt_leaves_no_file(large_torus_obj, tmp_path):
     assert list(tmp_path.iterdir()) == []
 
 
+def run_with(code, *words, path=()):
+    """Run code, then the command in a process of its own, in which Ctrl-C works whatever it does here."""
+    code = f"import atexit, os, runpy, signal; signal.signal(signal.SIGINT, signal.default_int_handler); {code}; "
+    code += "runpy.run_module('anisomesh', run_name='__main__', alter_sys=True)"
+    env = {**os.environ, "PYTHONPATH": os.pathsep.join([*map(str, path), *sys.path])}
+    return subprocess.run(
+        [sys.executable, "-c", code, *words], check=False, capture_output=True, text=True, timeout=60, env=env
+    )
+
+
 @pytest.mark.skipif(sys.platform == "win32", reason="Windows has no SIGINT for a single process")
 def test_interrupt_while_modules_are_imported_is_one_line(tmp_path):
     """The signal comes from a module that the command line imports, so that no clock is involved."""
     (tmp_path / "typer.py").write_text("import os, signal\nos.kill(os.getpid(), signal.SIGINT)\n")
-    code = "import signal, runpy; signal.signal(signal.SIGINT, signal.default_int_handler); "
-    code += "runpy.run_module('anisomesh', run_name='__main__')"
-    path = os.pathsep.join([str(tmp_path), *sys.path])
-    env = {**os.environ, "PYTHONPATH": path}
-    done = subprocess.run(
-        [sys.executable, "-c", code], check=False, capture_output=True, text=True, timeout=60, env=env
-    )
+    done = run_with("pass", path=[tmp_path])
     assert (done.returncode, done.stderr) == (130, "anisomesh: interrupted\n")
+
+
+@pytest.mark.skipif(sys.platform == "win32", reason="Windows has no SIGINT for a single process")
+def test_interrupt_while_the_interpreter_shuts_down_is_one_line():
+    """The signal comes when the command is done, as if Ctrl-C were pressed milliseconds before its end."""
+    done = run_with("atexit.register(os.kill, os.getpid(), signal.SIGINT)", "--version")
+    assert (done.returncode, done.stderr) == (130, "anisomesh: interrupted\n")
+    assert done.stdout.startswith("anisomesh ")
+
+
+@pytest.mark.skipif(sys.platform == "win32", reason="Windows has no SIGINT for a single process")
+def test_a_process_that_ignores_interrupts_ignores_them_at_the_end_too():
+    code = "signal.signal(signal.SIGINT, signal.SIG_IGN); atexit.register(os.kill, os.getpid(), signal.SIGINT)"
+    assert run_with(code, "--version").returncode == 0
 
 
 def test_until_the_whole_new_file_takes_its_place_the_old_one_is_there(run_cli, torus_obj, tmp_path, monkeypatch):

@@ -1,5 +1,7 @@
 """Non-manifold junctions: the sheets of the result meet as the sheets of the input do."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from junction_shapes import SHAPES, lengths_by_count, square
@@ -130,7 +132,7 @@ def test_points_to_keep_on_a_junction_are_vertices_of_all_its_sheets(name):
     [("wavy_fin", "far"), ("tee", "at the junction"), ("book", "at the junction"), ("two_boxes", "far")],
 )
 def test_sheets_are_joined_beside_locked_faces_and_to_them(name, lock):
-    """Junctions that locked faces touch keep their edges; all others are joined as without a lock."""
+    """Junctions keep the edges at which locked faces are; all others are joined as without a lock."""
     surface = Surface(*SHAPES[name]())
     junction = surface.points[np.unique(surface.edges[surface.edge_face_count > 2])]
     middles = surface.points[surface.faces].mean(axis=1)
@@ -145,6 +147,43 @@ def test_sheets_are_joined_beside_locked_faces_and_to_them(name, lock):
         for each in (surface.points[surface.faces[mask]], result.surface.points[result.surface.faces])
     )
     assert before <= after
+
+
+@pytest.mark.parametrize(("name", "share"), [("grid_of_boxes", 0.5), ("soap_films", 0.5)])
+def test_junctions_are_remeshed_where_no_locked_face_is_at_them(name, share):
+    """Junctions that are connected to a locked face, all of these, kept all their edges."""
+    surface = Surface(*SHAPES[name]())
+    middles = surface.points[surface.faces].mean(axis=1)
+    mask = middles[:, 0] < surface.points[:, 0].min() + 0.12 * np.ptp(surface.points[:, 0])
+    n = round(share * surface.n_points)
+    result = anisomesh.remesh(surface, n_vertices=n, lock=mask, embedding="direct", **FEW)
+    check_joined(surface, result, n)
+    corners = surface.points[surface.faces[mask]]  # of triangles that the repair may turn round
+    found = result.surface.points[result.surface.faces[: mask.sum()]]
+    before, after = ([sorted(map(tuple, each)) for each in rows.tolist()] for rows in (corners, found))
+    assert before == after
+    on_junction = surface.points[np.unique(surface.edges[surface.edge_face_count > 2])]
+    free = {tuple(row) for row in on_junction.tolist()} - {tuple(row) for row in corners.reshape(-1, 3).tolist()}
+    left = free & {tuple(row) for row in result.surface.points.tolist()}
+    assert len(free) >= 30
+    assert len(left) < 0.5 * len(free)
+
+
+@pytest.mark.parametrize(("wrong_starts", "seed"), [(0, 0), (1, 1), (9, None)])
+def test_joined_sheets_of_another_topology_are_made_anew_or_left_apart(monkeypatch, wrong_starts, seed):
+    """Another start is tried, and sheets apart, whose topology is right, are better than joined ones with a handle."""
+    check, seen = starts.check_validity, []
+
+    def with_handle(surface, reference, whole=None):
+        found = check(surface, reference, whole)
+        seen.append(whole)
+        return replace(found, euler=found.euler - 2) if whole is not None and len(seen) <= wrong_starts else found
+
+    monkeypatch.setattr(starts, "check_validity", with_handle)
+    result = anisomesh.remesh(Surface(*SHAPES["tee"]()), n_vertices=120, embedding="direct", **FEW)
+    assert result.validity.euler == result.validity.euler_input
+    assert ["separate in the result" in warning for warning in result.warnings] == [True] * (seed is None)
+    assert seed is None or result.seed == seed
 
 
 def test_a_locked_face_whose_side_is_split_at_a_junction_is_said_not_to_be_locked():

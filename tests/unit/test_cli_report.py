@@ -9,6 +9,8 @@ import pytest
 
 from anisomesh.cli import progress as display
 from anisomesh.cli.report import as_json, counted, describe_validity, summary, table
+from anisomesh.metric.names import METRIC_NAMES
+from anisomesh.options import EMBEDDINGS
 
 SOUND = {
     "closed": True,
@@ -66,21 +68,23 @@ def test_every_defect_is_named(change, words):
     assert ("manifold" in text.split(", ")) == ("nonmanifold" not in "".join(change))
 
 
+REPORT = {
+    "vertices": 1200,
+    "vertices_asked": 1000,
+    "faces": 2400,
+    "validity": SOUND,
+    "stretch": {"mean": 2.0, "max": 9.0},
+    "embedding": "hybrid",
+    "status": "converged",
+    "iterations": 50,
+    "energy": None,
+    "seconds": {"load": 0.1, "cvt": 1.0, "total": 1.2},
+    "warnings": ["something odd"],
+}
+
+
 def test_summary_names_warnings_notes_and_files(tmp_path):
-    report = {
-        "vertices": 1200,
-        "vertices_asked": 1000,
-        "faces": 2400,
-        "validity": SOUND,
-        "stretch": {"mean": 2.0, "max": 9.0},
-        "embedding": "hybrid",
-        "status": "converged",
-        "iterations": 50,
-        "energy": None,
-        "seconds": {"load": 0.1, "cvt": 1.0, "total": 1.2},
-        "warnings": ["something odd"],
-    }
-    text = summary(report, [tmp_path / "out.ply"], ["2 points merged"])
+    text = summary(REPORT, [tmp_path / "out.ply"], ["2 points merged"])
     for words in (
         "1,200 (asked for 1,000)",
         "something odd",
@@ -89,6 +93,24 @@ def test_summary_names_warnings_notes_and_files(tmp_path):
         "load 0.10",
     ):
         assert words in text
+
+
+def embedding_row(name, **options):
+    """Return the row of the summary that says what the embedding was made of."""
+    text = summary(REPORT | {"embedding": name, "options": options}, [], [])
+    return next(line for line in text.splitlines() if line.startswith("  embedding"))
+
+
+def test_the_summary_says_what_every_embedding_and_metric_is():
+    metrics = {name: embedding_row("direct", metric=name) for name in METRIC_NAMES}
+    assert len(set(metrics.values())) == len(metrics)
+    assert [name for name, row in metrics.items() if "curvature" in row] == ["curvature", "approximation"]
+    for name in set(EMBEDDINGS) - {"auto"}:
+        assert f"  {name} (" in embedding_row(name, metric="curvature")
+    file = {"metric": None, "metric_file": "a.sol"}
+    assert embedding_row("direct", **file) == "  embedding  direct (metric of a.sol)"
+    field = {"metric": None, "adapt_to": "solved.vtu:u"}
+    assert embedding_row("SolutionMetric", **field).endswith("direct (metric of the field solved.vtu:u)")
 
 
 def test_plain_progress_has_one_line_per_stage_and_then_waits(monkeypatch, capsys):

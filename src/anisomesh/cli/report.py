@@ -13,10 +13,15 @@ if TYPE_CHECKING:
 
     from anisomesh.mesh.surface import Surface
 
-_METRIC_SOURCES = {
-    "direct": "direct (metric of the measured curvature)",
+_EMBEDDINGS = {
     "neural": "neural (metric predicted by a network)",
     "hybrid": "hybrid (mean of the measured and the predicted metric)",
+    "filtered": "filtered (measured curvature after filters have removed noise)",
+}
+_METRICS = {
+    "curvature": "metric of the measured curvature",
+    "approximation": "metric of the least distance, from the measured curvature",
+    "uniform": "the same lengths in all directions",
 }
 _STAGE_ORDER = ("load", "prepare", "metric", "embed", "cvt", "dual", "fit", "attributes")
 
@@ -69,7 +74,6 @@ def summary(report: dict[str, Any], written: Sequence[Path], notes: Sequence[str
         Changes that the repair made to the input, one line each.
     """
     seconds, stretch = report["seconds"], report["stretch"]
-    file = report.get("options", {}).get("metric_file")
     stages = ", ".join(f"{stage} {seconds[stage]:.2f}" for stage in _STAGE_ORDER if stage in seconds)
     energy = "" if report["energy"] is None else f", energy {report['energy']:.4g}"
     rows = [
@@ -82,7 +86,7 @@ def summary(report: dict[str, Any], written: Sequence[Path], notes: Sequence[str
             "stretch",
             f"mean {stretch['mean']:.2f}, largest {stretch['max']:.2f} (of the triangles; 1 = equilateral)",
         ),
-        ("embedding", _METRIC_SOURCES[report["embedding"]] if file is None else f"direct (metric of {file})"),
+        ("embedding", _describe_embedding(report["embedding"], report.get("options", {}))),
         ("optimiser", f"{counted(report['iterations'], 'iteration')}{energy}: {report['status']}"),
         ("seconds", f"{seconds['total']:.2f} ({stages})"),
         *(("prepared", note) for note in notes),
@@ -91,6 +95,17 @@ def summary(report: dict[str, Any], written: Sequence[Path], notes: Sequence[str
         *(("wrote", str(path)) for path in written),
     ]
     return table(rows)
+
+
+def _describe_embedding(name: str, options: dict[str, Any]) -> str:
+    """Return in words what the embedding was made of, from its name and the options in the report of a remesh."""
+    if options.get("metric_file") is not None:
+        return f"direct (metric of {options['metric_file']})"
+    if options.get("adapt_to") is not None:
+        return f"direct (metric of the field {options['adapt_to']})"
+    if name == "direct":
+        return f"direct ({_METRICS[options.get('metric') or 'curvature']})"
+    return _EMBEDDINGS[name]
 
 
 def describe_lengths(conformity: dict[str, Any]) -> str:

@@ -14,13 +14,14 @@ import numpy.typing as npt
 
 from anisomesh.attributes.model import Mesh
 from anisomesh.errors import MeshError, MeshFileError, why_unreadable
-from anisomesh.io import material_files
 from anisomesh.io.assemble import as_mesh
 from anisomesh.io.atomic import atomic_path
 from anisomesh.io.convert import from_object
 from anisomesh.io.formats.words import BYTE_ORDER_MARK
 from anisomesh.io.holding import Losses
 from anisomesh.io.known_formats import READERS, TEXT_FORMATS, WRITERS, known_suffix
+from anisomesh.io.materials import files as material_files
+from anisomesh.io.materials.for_gltf import with_gltf_materials
 from anisomesh.mesh.surface import Surface
 
 logger = logging.getLogger(__name__)
@@ -238,6 +239,8 @@ def file_content(mesh: Mesh, name: str, suffix: str, losses: Losses, *, in_file:
     """
     folder = material_files.folder_of(name) if in_file else Path.cwd()
     mesh = material_files.with_texture_names(mesh, lambda name: material_files.relative_name(name, folder))
+    if suffix == ".glb":
+        mesh = with_gltf_materials([mesh], losses)[0]
     try:
         content = WRITERS[suffix](mesh, losses)
     except ValueError as error:

@@ -67,7 +67,7 @@ def bundled(mesh: Surface, junctions: Junctions, reference: Surface, *, exact: b
     bundles = []
     for curve, chains in zip(graph.curves, chained.chains, strict=True):
         ends = int(curve[0]), int(curve[-1])
-        least = 2 if ends[0] == ends[1] else int(between[min(ends), max(ends)] > 1)
+        least = 2 if ends[0] == ends[1] else int(between[min(ends), max(ends)] > 1 and len(curve) > 2)
         bundles.append(Bundle(joined_place[curve], chains, least))
     return Bundled(points, with_split_sides(mesh.faces, chained.splits), bundles)
 

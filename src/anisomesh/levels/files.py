@@ -8,11 +8,12 @@ from pathlib import Path
 
 from anisomesh.attributes.model import Mesh
 from anisomesh.errors import MeshFileError
-from anisomesh.io import material_files
 from anisomesh.io.atomic import atomic_paths
 from anisomesh.io.formats.gltf.write import glb_levels_bytes
 from anisomesh.io.holding import Losses
 from anisomesh.io.known_formats import known_suffix
+from anisomesh.io.materials import files as material_files
+from anisomesh.io.materials.for_gltf import with_gltf_materials
 from anisomesh.io.meshes import file_content, warn_of_losses
 
 
@@ -74,6 +75,6 @@ def _glb_content(meshes: Sequence[Mesh], path: Path, losses: Losses) -> bytes:
         material_files.with_texture_names(m, lambda name: material_files.relative_name(name, folder)) for m in meshes
     ]
     try:
-        return glb_levels_bytes(named, losses)
+        return glb_levels_bytes(with_gltf_materials(named, losses), losses)
     except ValueError as error:
         raise MeshFileError(f"{path}: cannot be written: {error}") from error

@@ -108,11 +108,13 @@ class PreparedInput:
         There are none if more points are fixed than the mesh has vertices. Fixed points on junctions are nodes, at
         which all sheets get a vertex when they are joined.
         """
-        anchored = self.fixed if self.junctions is None else self.fixed & ~self.junctions.on_several
+        surface, anchored = self.prepared.surface, self.fixed
+        if self.junctions is not None:
+            anchored = self.fixed & ~self.junctions.on_several
+            anchored[surface.edges[self.outline]] = True
         if np.count_nonzero(anchored) > n_vertices:
             return Anchors()
         number = np.cumsum(anchored) - 1
-        surface = self.prepared.surface
         return Anchors(frame.to_unit(surface.points[anchored]), number[surface.edges[self.outline]])
 
     def to_model(self, points: Points, frame: Frame) -> Points:

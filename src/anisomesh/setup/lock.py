@@ -42,8 +42,6 @@ class Cut:
     source
         Point of the sheets of the whole at each point of the rest (V',). Several are copies of one where the faces of
         the rest at it are apart; these have slightly different coordinates.
-    kept
-        Points (n,) of the whole, its sheets joined, on junctions that stay since locked faces touch them.
     locked
         Which faces of the whole surface (F,) stay as they are.
     face_source
@@ -57,7 +55,6 @@ class Cut:
     whole: PreparedInput
     rest: PreparedInput
     source: Ints
-    kept: Ints
     locked: FaceMask
     face_source: Ints
     remarks: tuple[str, ...]
@@ -71,7 +68,7 @@ class Cut:
     @cached_property
     def points(self) -> Ints:
         """Points (n,) of the whole, its sheets joined, that stay; they are the first ones of the result."""
-        return np.union1d(self.whole.surface.faces[self.locked], self.kept).astype(np.int64)
+        return np.unique(self.whole.surface.faces[self.locked]).astype(np.int64)
 
     @cached_property
     def _border(self) -> PointMask:
@@ -81,10 +78,19 @@ class Cut:
         mask[surface.edges[self.rest.outline]] = True
         return mask
 
+    @cached_property
+    def _joined_source(self) -> Ints:
+        """Point of the whole, its sheets joined, at each point of the rest (V',)."""
+        junctions = self.whole.junctions
+        return self.source if junctions is None or self.is_all else junctions.joined[self.source].astype(np.int64)
+
     @property
     def n_more(self) -> int:
         """Vertices that the result has more than the remeshed rest."""
-        return len(self.points) - int(np.count_nonzero(self._border))
+        border = np.flatnonzero(self._border)
+        border = border[np.isin(self._joined_source[border], self.points)]
+        junctions = self.rest.junctions
+        return len(self.points) - len(border if junctions is None else np.unique(junctions.joined[border]))
 
     @property
     def least(self) -> int:
@@ -104,9 +110,8 @@ class Cut:
         if self.is_all:
             return self.rest.least
         if n_vertices < self.least:
-            junctions = ", the junctions of sheets that they touch," if len(self.kept) else ""
             raise OptionError(
-                f"{n_vertices:,} vertices are asked for, and the locked regions{junctions} and points to keep have "
+                f"{n_vertices:,} vertices are asked for, and the locked regions and points to keep have "
                 f"{self.least:,}; ask for more, or lock less"
             )
         return n_vertices - self.n_more
@@ -115,9 +120,7 @@ class Cut:
         """Return a mesh of the rest, in model units, together with the locked faces, which come first."""
         if not self.locked.any():
             return rest
-        junctions = self.whole.junctions
-        source = self.source if junctions is None or self.is_all else junctions.joined[self.source]
-        return self._joined_at(rest, self.whole.surface, self.points, source)
+        return self._joined_at(rest, self.whole.surface, self.points, self._joined_source)
 
     def _reference(self, rest: Surface) -> Surface:
         """Return a surface of the rest, in model units, together with the locked faces, sheets apart."""
@@ -191,8 +194,10 @@ class Cut:
         return with_first_rows(mesh, given, points, self.face_source, self.weld)
 
 
-def cut_locked(whole: PreparedInput, mesh: Mesh, options: RemeshOptions) -> Cut:
+def cut_locked(whole: PreparedInput, mesh: Mesh, options: RemeshOptions, *, connected: bool = False) -> Cut:
     """Return a prepared input with the faces cut out that the options lock.
+
+    If ``connected``, junctions that are connected to these keep all edges.
 
     Raises
     ------
@@ -213,13 +218,11 @@ def cut_locked(whole: PreparedInput, mesh: Mesh, options: RemeshOptions) -> Cut:
     if locked.all():
         remarks.append("all faces are locked: the result is the input")
     is_part = locked.any() and not locked.all()
-    none = np.zeros(0, dtype=np.int64)
-    rest, source, kept = rest_of(whole, locked) if is_part else (whole, np.arange(surface.n_points), none)
+    rest, source = rest_of(whole, locked, connected=connected) if is_part else (whole, np.arange(surface.n_points))
     return Cut(
         whole=whole,
         rest=rest,
         source=source,
-        kept=kept,
         locked=locked,
         face_source=face_source,
         remarks=tuple(remarks),

@@ -33,16 +33,13 @@ class Rest(NamedTuple):
         The part.
     source
         Point of the whole input, its sheets apart, at each of its points (V',).
-    kept
-        Points (n,) of the whole, its sheets joined, on the junctions that locked faces touch: these stay as they are.
     """
 
     part: PreparedInput
     source: Ints
-    kept: Ints
 
 
-def rest_of(whole: PreparedInput, locked: FaceMask) -> Rest:
+def rest_of(whole: PreparedInput, locked: FaceMask, *, connected: bool = False) -> Rest:
     """Return the part of an input that is not locked.
 
     Parameters
@@ -51,14 +48,18 @@ def rest_of(whole: PreparedInput, locked: FaceMask) -> Rest:
         The input.
     locked
         Which faces (F,) of its sheets are locked; some are, and some are not.
+    connected
+        Whether all edges of junctions stay that are connected to locked faces.
 
     Notes
     -----
-    Connected junctions that a locked face touches keep all their edges, as the border does. Sheets are joined there
-    together with the locked faces, and at other junctions as without these.
+    Junctions keep the edges at which locked faces meet others, as the border does, and have a node at every vertex of
+    these.
     """
     surface = whole.prepared.surface
-    kept, on_kept = _kept_junctions(whole.junctions, locked, surface)
+    on_kept = np.zeros(len(surface.edges), dtype=bool)
+    if whole.junctions is not None:
+        on_kept = _kept_edges(whole.junctions, locked, surface, connected=connected)
     faces = surface.faces[~locked]
     n_fans, fan = corner_fans(faces, side_pairs(faces))
     source = np.empty(n_fans, dtype=np.int64)
@@ -76,7 +77,9 @@ def rest_of(whole: PreparedInput, locked: FaceMask) -> Rest:
     part = _told_apart(part, border)
     junctions = None
     if whole.junctions is not None:
-        junctions = _junctions_of(part, source, whole.junctions, kept, designed=is_designed(surface))
+        held = np.union1d(surface.faces[locked], surface.edges[on_kept])
+        held = np.unique(whole.junctions.joined[held])
+        junctions = _junctions_of(part, source, whole.junctions, held, designed=is_designed(surface))
     n_fixed = np.count_nonzero(fixed) if junctions is None else len(np.unique(junctions.joined[fixed]))
     rest = replace(
         whole,
@@ -97,7 +100,7 @@ def rest_of(whole: PreparedInput, locked: FaceMask) -> Rest:
         outline=outline,
         least=max(_FEWEST, int(n_fixed)),
     )
-    return Rest(rest, source, kept)
+    return Rest(rest, source)
 
 
 def _keys(junctions: Junctions) -> Ints:
@@ -106,33 +109,33 @@ def _keys(junctions: Junctions) -> Ints:
     return np.unique(edge_keys(np.concatenate(sides)))
 
 
-def _kept_junctions(junctions: Junctions | None, locked: FaceMask, surface: Surface) -> tuple[Ints, EdgeMask]:
-    """Return the joined points (n,) on junctions that locked faces (F,) touch, and which edges (E,) are on these."""
-    if junctions is None:
-        return np.zeros(0, dtype=np.int64), np.zeros(len(surface.edges), dtype=bool)
-    keys, count = _keys(junctions), int(junctions.joined.max()) + 1
-    ends = np.stack([keys >> 32, keys & 0xFFFFFFFF], axis=1)
+def _kept_edges(junctions: Junctions, locked: FaceMask, surface: Surface, *, connected: bool) -> EdgeMask:
+    """Return which edges (E,) of the sheets are, when these are joined, on junctions and sides of locked faces (F,).
+
+    If ``connected``, on junctions that are connected to vertices of locked faces.
+    """
+    keys, all_keys = edge_keys(junctions.joined[surface.edges]), _keys(junctions)
+    if not connected:
+        return np.isin(keys, np.intersect1d(keys[np.unique(surface.face_edges[locked])], all_keys))
+    count, ends = int(junctions.joined.max()) + 1, np.stack([all_keys >> 32, all_keys & 0xFFFFFFFF], axis=1)
     graph = sparse.coo_matrix((np.ones(len(ends)), ends.T), shape=(count, count))
     component = connected_components(graph, directed=False)[1]
-    on_locked = np.unique(junctions.joined[surface.faces[locked]])
-    touched = np.isin(component[ends[:, 0]], component[np.intersect1d(on_locked, ends)])
-    edges = np.isin(edge_keys(junctions.joined[surface.edges]), keys[touched])
-    return np.unique(ends[touched]).astype(np.int64), np.asarray(edges)
+    on_locked = np.intersect1d(junctions.joined[surface.faces[locked]], ends)
+    return np.isin(keys, all_keys[np.isin(component[ends[:, 0]], component[on_locked])])
 
 
-def _junctions_of(part: Surface, source: Ints, whole: Junctions, kept: Ints, *, designed: bool) -> Junctions | None:
-    """Return the junctions of a part of some sheets, except at kept joined points (n,); None if there are no others."""
-    keys = _keys(whole)
-    keys = keys[~np.isin(keys >> 32, kept)]
+def _junctions_of(part: Surface, source: Ints, whole: Junctions, held: Ints, *, designed: bool) -> Junctions | None:
+    """Return the junctions of a part of some sheets, with nodes at held joined points (n,); None if it has none."""
+    before = whole.joined[source].astype(np.int64)
+    keys = np.intersect1d(_keys(whole), edge_keys(before[part.edges]))
     if len(keys) == 0:
         return None
     on_curves = np.unique([keys >> 32, keys & 0xFFFFFFFF])
-    before = whole.joined[source].astype(np.int64)
     apart = ~np.isin(before, on_curves)
     before[apart] = len(whole.joined) + np.flatnonzero(apart)
     known, joined = np.unique(before, return_inverse=True)
     ends = np.searchsorted(known, np.stack([keys >> 32, keys & 0xFFFFFFFF], axis=1))
-    nodes = np.zeros(len(known), dtype=bool)
+    nodes = np.isin(known, held)
     nodes[joined[whole.graph.nodes[source]]] = True
     labels = joined.reshape(-1).astype(np.int32)
     graph = graph_of(part, labels, np.sort(edge_keys(ends)), nodes, turns_are_corners=designed)

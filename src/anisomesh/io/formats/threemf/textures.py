@@ -68,7 +68,9 @@ def textured(mesh: Mesh, first: int, losses: Losses) -> Textured | None:
     uv = _coordinates(mesh)
     if division is None or uv is None or not isinstance(given, Mapping):
         return None
-    tables = {label: table for label, table in given.items() if isinstance(table, Mapping) and _kind(table)}
+    tables = {
+        label: table for label, table in given.items() if isinstance(table, Mapping) and image_kind(table.get("data"))
+    }
     texts = region_texts(division, losses, _as_part, distinct=True)
     attributes = np.full(mesh.surface.n_faces, "", dtype=object)
     resources, images, number = [], dict[str, tuple[str, bytes]](), first
@@ -78,7 +80,7 @@ def textured(mesh: Mesh, first: int, losses: Losses) -> Textured | None:
             if label != 0 or label in division.names:
                 losses.say(f"the texture {texts[label]!r}, whose image is missing")
             continue
-        part, kind = f"{_FOLDER}/{texts[label]}", _kind(tables[label])
+        part, kind = f"{_FOLDER}/{texts[label]}", image_kind(tables[label]["data"])
         images[part] = kind, bytes(tables[label]["data"])
         rows, members = np.unique(uv[chosen].reshape(-1, 2), axis=0, return_inverse=True)
         resources.append(_group(number, part, {**tables[label], "contenttype": kind}, rows))
@@ -98,9 +100,8 @@ def _coordinates(mesh: Mesh) -> Array | None:
     return uv.astype(np.float64)
 
 
-def _kind(table: Mapping[str, Any]) -> str:
-    """Return the kind of the image of a texture, empty if there is none that 3MF holds."""
-    data = table.get("data")
+def image_kind(data: Any) -> str:
+    """Return the kind of the content of an image, empty if it is none that 3MF and glTF hold."""
     if not isinstance(data, bytes):
         return ""
     return next((kind for begin, kind in _IMAGE_KINDS.items() if data.startswith(begin)), "")

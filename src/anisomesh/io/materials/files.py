@@ -136,6 +136,15 @@ def _free_name(folder: Path, stem: str) -> Path:
         number += 1
 
 
+def referred_file(line: str, folder: Path) -> Path | None:
+    """Return the file that a line of materials names, from a folder or absolutely; None if there is none."""
+    for spelling in (line, line.replace("\\", "/")):  # backslashes of Windows
+        place = _texture_name(spelling, folder, absolute=True)
+        if place is not None:
+            return folder / spelling[place:].strip()
+    return None
+
+
 def _moved(text: str, old: Path, new: Path) -> str:
     """Return materials with the textures that are found from the old folder named from the new one."""
     lines = []
@@ -149,13 +158,13 @@ def _moved(text: str, old: Path, new: Path) -> str:
     return "\n".join([*lines, ""])
 
 
-def _texture_name(line: str, folder: Path) -> int | None:
+def _texture_name(line: str, folder: Path, *, absolute: bool = False) -> int | None:
     """Return where the name of an existing file begins that ends a line, after options and their values."""
     starts = [match.end() for match in re.finditer(r"\s+", line.rstrip())]
     for start in starts:
         name = line[start:].strip()
         try:
-            if name and not Path(name).is_absolute() and (folder / name).is_file():
+            if name and (absolute or not Path(name).is_absolute()) and (folder / name).is_file():
                 return start
         except (OSError, ValueError):
             continue

@@ -1,0 +1,1 @@
+"""Materials: files beside mesh files, and from format to format."""
