@@ -19,6 +19,7 @@ from anisomesh._kernels import (
     neighbours,
     orientation,
     products,
+    rings,
 )
 
 _REMESH = (
@@ -31,6 +32,7 @@ _REMESH = (
     neighbours.displacements,
     neighbours.walk,
     local_step.local_step,
+    rings.mean_ring_lengths,
 )
 _FIT = (  # exchanges of edges compile more, where there are any
     fit_moves.move_points,
