@@ -105,7 +105,7 @@ def _mesh_of_start(start: MeshTask, options: RemeshOptions, run: Run) -> MadeMes
         if conforming is not None and join is not None:
             surface = join.joined(conforming, surface)
             mesh = replace(mesh, points=surface.points, faces=surface.faces)
-        validity = check_validity(surface, task.surface, None if join is None else join.junctions.whole)
+        validity = check_validity(surface, task.reference, None if join is None else join.junctions.whole)
     facts = options.seed, optimised.iterations, optimised.status, soundness(validity)
     logger.info("seed %d: %d iterations, %s; mesh: %s", *facts)
     return MadeMesh(

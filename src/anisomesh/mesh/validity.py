@@ -80,7 +80,7 @@ class Validity:
         return asdict(self)
 
 
-def check_validity(result: Surface, reference: Surface, whole: Surface | None = None) -> Validity:
+def check_validity(result: Surface, reference: Surface | ClosestPoints, whole: Surface | None = None) -> Validity:
     """Compare the topology of a remesh with its input's and count its defects.
 
     Parameters
@@ -88,9 +88,11 @@ def check_validity(result: Surface, reference: Surface, whole: Surface | None = 
     result
         The remesh.
     reference, whole
-        Its prepared input, consistently oriented, in the same units, and the same with its sheets joined if it is cut.
+        Its prepared input, consistently oriented, in the same units, or closest points of that, and the same surface
+        with its sheets joined if it is cut.
     """
-    closest, whole = ClosestPoints(reference), reference if whole is None else whole
+    closest = reference if isinstance(reference, ClosestPoints) else ClosestPoints(reference)
+    whole = closest.surface if whole is None else whole
     return Validity(
         closed=bool((result.edge_face_count == 2).all()),
         boundary_loops=len(boundary_loops(result.faces)),
