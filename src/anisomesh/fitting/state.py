@@ -8,7 +8,7 @@ import numpy as np
 import numpy.typing as npt
 
 from anisomesh._kernels import fit_collapses, fit_moves, fit_samples, fit_splits
-from anisomesh.execution.threads import Workers
+from anisomesh.execution.threads import Workers, blocks
 from anisomesh.fitting.arrays import STAYS, FitTask, fit_arrays_of, workspace
 from anisomesh.fitting.planes import onto_planes
 from anisomesh.fitting.samples import SurfaceSamples
@@ -18,7 +18,7 @@ _MIN_RMS = 1e-8  # of the diagonal of the surface: an error that counts as exact
 _MAX_DISTANCE = 5.0  # of a vertex from the surface, in root mean squared errors at the start; heuristic
 _CHEAP_FACTOR = 8  # times as many splits and collapses as are needed are looked at closely; heuristic
 _LISTED_SLACK = 1.5  # factor of the listed cost of a collapse, up to which it is done when its turn comes; heuristic
-_PARTS, _MIN_PART = 4, 64  # parts of the points of a colour for each thread, and points of a part at least
+_PARTS, _MIN_PART = 4, 64  # parts of the points of a colour for each thread, and points of all but the last
 _ALLOWED = 0.5 * fit_splits.REFUSED
 
 
@@ -101,8 +101,8 @@ class FitState:
             return int(fit_moves.move_points(self._views[thread], points, price, self._max_square))
 
         for start, end in pairwise(bounds.tolist()):
-            n_parts = max(1, min(_PARTS * len(self._views), (end - start) // _MIN_PART))
-            count += sum(self._workers.map(work, np.array_split(order[start:end], n_parts)))
+            size = max(_MIN_PART, -(-(end - start) // (_PARTS * len(self._views))))
+            count += sum(self._workers.map(work, blocks(order[start:end], size)))
         return count
 
     def flip(self, price: float) -> int:
