@@ -239,7 +239,8 @@ class FitState:
     def _in_parts(self, work: Work, n: int, views: list[fit_arrays.Fit] | None = None) -> None:
         """Let the workers do ``work(thread, view, first, last)`` on all of n items, in parts."""
         views = self._views if views is None else views
-        size = max(_MIN_ITEMS, -(-n // (_PARTS * len(views))))
+        n_parts = _PARTS * len(views) if len(views) > 1 else 1
+        size = max(_MIN_ITEMS, -(-n // n_parts))
         parts = [(first, min(first + size, n)) for first in range(0, n, size)]
         self._workers.map(lambda thread, part: work(thread, views[thread], *part), parts)
 
