@@ -9,6 +9,9 @@ VENV := .venv
 BIN := $(VENV)/bin
 # The tests share one process per core: make test WORKERS=4
 WORKERS ?= auto
+# Python keeps what it has compiled of the modules, also where the environment forbids it: else every process of the tests
+# compiles NumPy, SciPy, Numba and all else that it imports.
+unexport PYTHONDONTWRITEBYTECODE
 PYTEST := $(BIN)/python -m pytest --numprocesses $(WORKERS) --dist worksteal
 
 .PHONY: demo docs test test-fast install check clean

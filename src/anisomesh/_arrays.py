@@ -1,15 +1,18 @@
 """Array types with their shapes, and the reading of a user's values as an array.
 
 ``V`` is the number of points, ``F`` of faces, ``E`` of edges, ``S`` of sites; ``d`` is the dimension of the embedding.
-Geometry is float64; indices are int32, and -1 means "none". The shapes are documentation: type checkers see plain
-NumPy arrays.
+Geometry is float64; indices are int32, and -1 means "none". Types of numbers and shapes are documentation:
+type checkers see plain NumPy arrays.
 """
 
+from typing import Annotated as Bool
+from typing import Annotated as Float64
+from typing import Annotated as Int32
+from typing import Annotated as Int64
 from typing import Any
 
 import numpy as np
 import numpy.typing as npt
-from jaxtyping import Bool, Float64, Int32, Int64
 
 Points = Float64[np.ndarray, "V 3"]
 Faces = Int32[np.ndarray, "F 3"]

@@ -8,7 +8,7 @@ import pytest
 
 from anisomesh.errors import OptionError
 from anisomesh.mesh.surface import Surface
-from anisomesh.metric.curvature import principal_curvatures
+from anisomesh.metric.curvature import mean_ring_normals, principal_curvatures
 from anisomesh.shapes.analytic import box, open_patch, sphere, torus
 
 TETRAHEDRON = (
@@ -204,3 +204,13 @@ print(done)
     )
     assert run.returncode == 0, run.stderr[-2000:]
     assert int(run.stdout) > 20
+
+
+def test_mean_normals_over_rings_are_those_of_powers_of_the_adjacency_matrix():
+    surface = open_patch(lambda x, y: x * y, 8)
+    near = np.eye(surface.n_points, dtype=bool)
+    near[tuple(surface.edges.T)] = near[tuple(surface.edges[:, ::-1].T)] = True
+    ring = np.linalg.matrix_power(near.astype(float), 3) > 0.0
+    mean = ring @ surface.point_normals / ring.sum(axis=1, keepdims=True)
+    found = mean_ring_normals(surface.point_normals, surface.edges, 3)
+    np.testing.assert_allclose(found, np.linalg.norm(mean, axis=1), atol=1e-12)

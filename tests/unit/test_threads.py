@@ -3,9 +3,10 @@
 import threading
 import time
 
+import numpy as np
 import pytest
 
-from anisomesh.execution.threads import Workers
+from anisomesh.execution.threads import Workers, blocks
 
 
 @pytest.mark.parametrize("threads", [1, 2, 5])
@@ -40,3 +41,11 @@ def test_an_error_in_any_thread_is_raised(bad):
     with pytest.raises(ValueError, match=str(bad)):
         workers.map(work, range(8))
     assert workers.map(lambda thread, item: item, range(4)) == [0, 1, 2, 3]
+
+
+@pytest.mark.parametrize("n", [0, 1, 6, 7])
+def test_blocks_have_all_items_in_order_and_all_but_the_last_have_the_size(n):
+    parts = blocks(np.arange(n), 3)
+    assert np.concatenate(parts).tolist() == list(range(n))
+    assert all(len(part) == 3 for part in parts[:-1])
+    assert len(parts[-1]) <= 3

@@ -124,17 +124,18 @@ def _collapse(fit, f, i, price, max_square, limit):
 
 
 @kernel
-def collapse_estimates(fit, price, quadrics, estimates):
-    """Write about what a collapse of every side changes the energy by (F, 3): sides of lower faces, others are refused.
+def collapse_estimates(fit, price, quadrics, estimates, first, last):
+    """Write about what a collapse of the sides of some faces changes the energy by (F, 3).
 
-    The error is estimated by the quadrics of the faces around the point that goes, at the point that it goes into.
+    A side of two faces is looked at in the lower one, and refused in the other. The error is estimated by the quadrics
+    of the faces around the point that goes, at the point that it goes into.
 
     References
     ----------
     Garland, Heckbert, "Surface simplification using quadric error metrics", 1997.
     """
     mesh, patch = fit.mesh, fit.patch
-    for face in range(len(estimates)):
+    for face in range(first, last):
         for side in range(3):
             estimates[face, side] = REFUSED
             if mesh.faces[face, 0] < 0 or face > mesh.neighbours[face, side]:
@@ -153,7 +154,10 @@ def collapse_estimates(fit, price, quadrics, estimates):
 
 @kernel
 def collapse_costs(fit, sides, price, max_square, costs):
-    """Write what a collapse of some sides, 3 face + side (n,), changes the energy by (n,); faces may be gone."""
+    """Write what a collapse of some sides, 3 face + side (n,), changes the energy by (n,); faces may be gone.
+
+    Points are moved meanwhile, and put back.
+    """
     for k in range(len(sides)):
         f, i = sides[k] // 3, sides[k] % 3
         costs[k] = REFUSED

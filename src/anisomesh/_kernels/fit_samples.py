@@ -1,4 +1,8 @@
-"""Passes over all samples of a fitted mesh: the nearest faces, the metric of the faces, error and quality."""
+"""Passes over the samples of a fitted mesh: the nearest faces, the metric of the faces, error and quality.
+
+Passes over a part of the samples or the faces, from ``first`` to ``last``, may run at the same time. Sums over samples
+are added in their order, so they do not depend on the parts.
+"""
 
 from .compiled import inlined, kernel
 from .fit_patch import OPPOSED_COSINE, quality, unit_normal
@@ -50,44 +54,68 @@ def _nearer_face(fit, sample):
 
 
 @kernel
-def walk_samples(fit, everywhere):
-    """Move samples to the lists of the nearest faces, and list them anew: the ones of faces with an active point."""
+def walk_samples(fit, everywhere, first, last):
+    """Find the nearest faces of some samples, the ones of faces with an active point; the lists stay."""
     mesh, samples, active = fit.mesh, fit.samples, fit.active
+    for sample in range(first, last):
+        corners = mesh.faces[samples.owner[sample]]
+        if everywhere or active[corners[0]] or active[corners[1]] or active[corners[2]]:
+            samples.owner[sample] = _nearer_face(fit, sample)
+
+
+@kernel
+def list_samples(fit):
+    """Put all samples on the lists of their faces."""
+    samples = fit.samples
     for face in range(len(samples.first)):
         samples.first[face] = -1
     for sample in range(len(samples.points)):
         face = samples.owner[sample]
-        corners = mesh.faces[face]
-        if everywhere or active[corners[0]] or active[corners[1]] or active[corners[2]]:
-            face = _nearer_face(fit, sample)
-            samples.owner[sample] = face
         samples.following[sample] = samples.first[face]
         samples.first[face] = sample
 
 
 @kernel
-def face_errors(fit, errors):
-    """Write the sum of the weighted squared distances of the samples of each face (F,)."""
+def sample_errors(fit, errors, first, last):
+    """Write the weighted squared distances of some samples to their faces (S,)."""
     mesh, samples = fit.mesh, fit.samples
-    for face in range(len(errors)):
-        errors[face] = 0.0
-    for sample in range(len(samples.points)):
-        face = samples.owner[sample]
-        a, b, c = face_points(mesh, face)
-        errors[face] += samples.weights[sample] * square_to_triangle(coordinates(samples.points, sample), a, b, c)
+    for sample in range(first, last):
+        a, b, c = face_points(mesh, samples.owner[sample])
+        errors[sample] = samples.weights[sample] * square_to_triangle(coordinates(samples.points, sample), a, b, c)
 
 
 @kernel
-def average_roots(fit, totals):
-    """Set the metric of each face to the mean over its samples that face its way; without any it stays.
+def face_errors(fit, of_samples, errors):
+    """Write the sum of the errors of the samples (S,) of each face (F,)."""
+    owner = fit.samples.owner
+    for face in range(len(errors)):
+        errors[face] = 0.0
+    for sample in range(len(owner)):
+        errors[owner[sample]] += of_samples[sample]
+
+
+@kernel
+def sum_in_order(values):
+    """Return the sum of values (n,), added one after the other."""
+    total = 0.0
+    for value in values:
+        total += value
+    return total
+
+
+@kernel
+def average_roots(fit, totals, first, last):
+    """Set the metric of some faces to the mean over their samples that face their way; without any it stays.
 
     ``totals`` is workspace (F,).
     """
     mesh, samples, roots = fit.mesh, fit.samples, fit.roots
-    for face in range(len(totals)):
+    for face in range(first, last):
         totals[face] = 0.0
     for sample in range(len(samples.points)):
         face = samples.owner[sample]
+        if face < first or face >= last:
+            continue
         a, b, c = face_points(mesh, face)
         if dot(coordinates(samples.normals, sample), unit_normal(a, b, c)[0]) < _MIN_SAME_COSINE:
             continue
@@ -99,22 +127,11 @@ def average_roots(fit, totals):
         for i in range(3):
             for j in range(3):
                 roots[face, i, j] += samples.weights[sample] * samples.roots[sample, i, j]
-    for face in range(len(totals)):
+    for face in range(first, last):
         if totals[face] > 0.0:
             for i in range(3):
                 for j in range(3):
                     roots[face, i, j] /= totals[face]
-
-
-@kernel
-def fit_error(fit):
-    """Return the sum of the weighted squared distances of all samples to their faces."""
-    mesh, samples = fit.mesh, fit.samples
-    total = 0.0
-    for sample in range(len(samples.points)):
-        a, b, c = face_points(mesh, samples.owner[sample])
-        total += samples.weights[sample] * square_to_triangle(coordinates(samples.points, sample), a, b, c)
-    return total
 
 
 @kernel

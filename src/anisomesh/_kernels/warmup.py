@@ -19,6 +19,7 @@ from anisomesh._kernels import (
     neighbours,
     orientation,
     products,
+    rings,
 )
 
 _REMESH = (
@@ -31,13 +32,16 @@ _REMESH = (
     neighbours.displacements,
     neighbours.walk,
     local_step.local_step,
+    rings.mean_ring_lengths,
 )
 _FIT = (  # exchanges of edges compile more, where there are any
     fit_moves.move_points,
     fit_moves.flip_edges,
     fit_samples.walk_samples,
     fit_samples.average_roots,
-    fit_samples.fit_error,
+    fit_samples.list_samples,
+    fit_samples.sample_errors,
+    fit_samples.sum_in_order,
     fit_samples.quality_sum,
     fit_planes.face_planes,
     fit_planes.place_on_planes,

@@ -7,7 +7,6 @@ from functools import cached_property
 
 import numpy as np
 import numpy.typing as npt
-from scipy.optimize import linear_sum_assignment
 from scipy.spatial import cKDTree
 from scipy.spatial.distance import cdist
 
@@ -185,6 +184,8 @@ class _Samples:
             tree = self.of_loop(k).tree
             for j in np.flatnonzero(costs[:, k] < _FAR).tolist():
                 costs[j, k] = (tree.query(self._queries(loops[j]))[0] ** 2).mean()
+        from scipy.optimize import linear_sum_assignment  # rarely needed, and a tenth of the time of importing all
+
         return np.asarray(linear_sum_assignment(costs)[1])
 
     def of_loop(self, number: int) -> _Samples:

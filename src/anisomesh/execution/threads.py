@@ -7,8 +7,17 @@ from collections.abc import Callable, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from typing import TypeVar
 
+import numpy as np
+import numpy.typing as npt
+
 _Item = TypeVar("_Item")
 _Result = TypeVar("_Result")
+_Number = TypeVar("_Number", bound=np.generic)
+
+
+def blocks(items: npt.NDArray[_Number], size: int) -> list[npt.NDArray[_Number]]:
+    """Return an array (n,) in blocks of this size, the last one shorter; an empty one is a block, too."""
+    return [items[first : first + size] for first in range(0, max(len(items), 1), size)]
 
 
 class Workers:

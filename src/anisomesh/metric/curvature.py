@@ -7,9 +7,9 @@ from dataclasses import dataclass
 import igl
 import numpy as np
 import numpy.typing as npt
-from scipy import sparse
 
 from anisomesh._arrays import Edges, Faces, PointMask, PointScalars, PointVectors
+from anisomesh._kernels.rings import mean_ring_lengths
 from anisomesh.errors import OptionError
 from anisomesh.mesh.geometry import unit
 from anisomesh.mesh.surface import Surface
@@ -23,7 +23,6 @@ _MIN_FIT_HEIGHT = 1e-6  # height over longest side of the faces that libigl may 
 _MIN_SAFE_NORMAL = 1e-5  # mean unit normal of a ring: libigl ends the process at 0; far above rounding, 1e-16
 _MIN_RELIABLE_NORMAL = 0.1  # mean unit normal of a ring below which its fit is arbitrary; heuristic
 _MIN_TANGENT_PART = 0.1  # length of a fitted unit direction in the tangent plane, sine of the angle; heuristic
-_RING_BLOCK = 1024  # points at once, to bound the memory of their rings
 
 PointPairs = npt.NDArray[np.float64]
 """Two values at each point (V, 2)."""
@@ -97,6 +96,18 @@ def principal_curvatures(surface: Surface, *, radius: int = DEFAULT_RADIUS) -> P
     )
 
 
+def mean_ring_normals(normals: PointVectors, edges: Edges, radius: int) -> PointScalars:
+    """Return the length of the mean of unit normals (V, 3) over the ``radius``-ring of each point (V,)."""
+    size = len(normals)
+    start, end = np.concatenate([edges, edges[:, ::-1]]).T
+    first = np.concatenate([[0], np.cumsum(np.bincount(start, minlength=size))])
+    seen, ring = np.full(size, -1, dtype=np.int32), np.empty(size, dtype=np.int32)
+    result = np.empty(size)
+    neighbours = end[np.argsort(start, kind="stable")]
+    mean_ring_lengths(np.array(normals, order="C"), first, neighbours, radius, seen, ring, result)
+    return result
+
+
 def _quadric_curvatures(surface: Surface, radius: int, normals: PointVectors) -> tuple[PointPairs, PointVectors]:
     """Return curvatures sorted by magnitude (NaN without a fit) and the direction of the larger (zero without one)."""
     values = np.full((surface.n_points, 2), np.nan)
@@ -127,29 +138,13 @@ def _faces_to_fit(surface: Surface, radius: int) -> tuple[Faces, PointMask]:
     used, local = np.unique(faces, return_inverse=True)
     local = local.reshape(-1, 3).astype(np.int32)
     normals = igl.per_vertex_normals(surface.points[used], local.astype(np.int64))
-    length = _mean_ring_normal(normals, edges_of(local)[0], radius)
+    length = mean_ring_normals(normals, edges_of(local)[0], radius)
     unreliable[used] = ~(length > _MIN_RELIABLE_NORMAL)
     unsafe = ~(length > _MIN_SAFE_NORMAL)
     if unsafe.any():
         _, component = connected_components(local, len(used))
         faces = faces[~np.isin(component, component[unsafe[local].any(axis=1)])]
     return faces, unreliable
-
-
-def _mean_ring_normal(normals: PointVectors, edges: Edges, radius: int) -> PointScalars:
-    """Return the length of the mean unit normal (V,) over the ``radius``-ring of each point."""
-    size = len(normals)
-    rows, columns = np.concatenate([edges, edges[:, ::-1]]).T
-    step = sparse.csr_matrix((np.ones(len(rows), dtype=np.bool_), (rows, columns)), shape=(size, size))
-    step = step + sparse.identity(size, dtype=np.bool_, format="csr")
-    result = np.empty(size)
-    for start in range(0, size, _RING_BLOCK):
-        ring = step[start : start + _RING_BLOCK]
-        for _ in range(radius - 1):
-            ring = ring @ step
-        mean = (ring.astype(np.float64) @ normals) / np.diff(ring.indptr)[:, None]
-        result[start : start + _RING_BLOCK] = np.linalg.norm(mean, axis=1)
-    return result
 
 
 def _taubin_curvatures(surface: Surface, normals: PointVectors) -> tuple[PointPairs, PointVectors]:

@@ -11,7 +11,7 @@ from scipy.spatial import cKDTree
 from anisomesh._arrays import Sites
 from anisomesh._kernels import clip
 from anisomesh._kernels.neighbours import age_lists, displacements, limit_radius, refresh_lists, walk
-from anisomesh.execution.threads import Workers
+from anisomesh.execution.threads import Workers, blocks
 from anisomesh.voronoi.blocks import Blocks
 
 # performance only: no value changes a result beyond rounding (benchmarks/speed.py)
@@ -223,5 +223,7 @@ class NeighbourLists:
 
     def _share(self, which: Rows, work: Callable[[Rows], None]) -> None:
         """Let the workers do the work on these sites."""
-        parts = self._workers.threads if len(which) > _MIN_SITES_FOR_THREADS else 1
-        self._workers.map(lambda _, part: work(part), np.array_split(which, parts))
+        if len(which) > _MIN_SITES_FOR_THREADS:
+            self._workers.map(lambda _, part: work(part), blocks(which, -(-len(which) // self._workers.threads)))
+        else:
+            work(which)

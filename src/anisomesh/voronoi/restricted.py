@@ -12,7 +12,7 @@ import numpy.typing as npt
 from anisomesh._arrays import Sites, SiteScalars
 from anisomesh._kernels import clip, diagram, integrate
 from anisomesh.errors import OptionError
-from anisomesh.execution.threads import Workers
+from anisomesh.execution.threads import Workers, blocks
 from anisomesh.mesh.embedded_surface import EmbeddedSurface
 from anisomesh.voronoi.diagram import Diagram, DiagramPart, assemble
 from anisomesh.voronoi.neighbour_lists import NeighbourLists
@@ -147,7 +147,7 @@ class RestrictedVoronoi:
             )
             problems = buffers.problems[:n_problems].copy()
             part = DiagramPart.empty(n, n_vertices)
-            good = np.setdiff1d(chunk, problems[:, 0])
+            good = np.setdiff1d(chunk, problems[:, 0]) if n_problems else chunk
             diagram.write_chunk(good, self._owners, self.embedded.facets, self._table, buffers.workspace, *part)
             return part, problems
 
@@ -181,8 +181,9 @@ class RestrictedVoronoi:
             facets = np.arange(self.embedded.surface.n_faces, dtype=np.int32)
         parts: list[_T] = []
         for _ in range(_MAX_REPAIR_ROUNDS):
-            chunks = np.split(facets, np.arange(self._chunk, len(facets), self._chunk))
-            results = self._workers.map(lambda thread, chunk: work(chunk, self._buffers[thread]), chunks)
+            results = self._workers.map(
+                lambda thread, chunk: work(chunk, self._buffers[thread]), blocks(facets, self._chunk)
+            )
             parts.extend(part for part, _ in results)
             problems = np.concatenate([problems for _, problems in results])
             if len(problems) == 0:
