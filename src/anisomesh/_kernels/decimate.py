@@ -12,8 +12,6 @@ from .vectors import coordinates, cross, dot, length, squared_length, subtract, 
 _PULL = 1e-6  # towards the middle of an edge, where the planes leave the place open
 _MAX_STEP = 1.0  # edge lengths from the middle of an edge to the place of its point
 _WALL_WEIGHT = 3.0  # of an edge of the boundary or a crease, in squared lengths; heuristic
-_MIN_COSINE = 0.2  # between the normals of a triangle before and after a collapse; heuristic
-_MIN_THICKNESS = 1e-4  # area over squared longest side of a new triangle, unless there was a thinner one; heuristic
 
 
 class Decimation(NamedTuple):
@@ -33,8 +31,14 @@ class Decimation(NamedTuple):
         Whether other points go to where their quadrics are lowest, and not to one of two.
     evenness
         Weight of squared lengths beside squared distances: short edges go first.
+    cosine
+        Least cosine between the normals of a triangle before and after a collapse.
+    thickness
+        Least area over squared longest side of a new triangle, unless there was a thinner one.
     face_at
         One of the faces at each point (V,).
+    origin
+        The point (V,) at whose place each one was at the start; without moves it is there now.
     changed
         The number of collapses after which each point was changed last (V,); -1 if it is gone.
     heap
@@ -49,7 +53,10 @@ class Decimation(NamedTuple):
     on_line: Any
     moves: Any
     evenness: Any
+    cosine: Any
+    thickness: Any
     face_at: Any
+    origin: Any
     changed: Any
     heap: Any
     stars: Any
@@ -116,9 +123,9 @@ def _keeps_shapes(state, faces, corners, n, other, place):
         a, b = coordinates(mesh.points, first), coordinates(mesh.points, second)
         old, thin = _thickness(point, a, b)
         new, thickness = _thickness(place, a, b)
-        if not thickness >= min(thin, _MIN_THICKNESS):
+        if not thickness >= min(thin, state.thickness):
             return False
-        if not dot(old, new) >= _MIN_COSINE * length(old) * length(new) or not thickness > 0.0:
+        if not dot(old, new) >= state.cosine * length(old) * length(new) or not thickness > 0.0:
             return False
     return True
 
@@ -193,6 +200,8 @@ def _collapse(state, p, q):
             _note_face(state, stars.other_faces[k])
     for k in range(10):
         state.quadrics[into, k] += state.quadrics[gone, k]
+    if place == coordinates(mesh.points, gone):
+        state.origin[into] = state.origin[gone]
     mesh.points[into, 0], mesh.points[into, 1], mesh.points[into, 2] = place
     state.changed[gone] = -1
     return into

@@ -15,6 +15,7 @@ from anisomesh.meshops.decimation import decimation_arrays
 _SAMPLED_FACES = 20_000  # whose edges say how large costs are
 _FIRST_SHARE = 0.2  # of the edges that the first pass may collapse; heuristic
 _GROWTH = 1.25  # of the largest cost from pass to pass; heuristic
+_COSINE, _THICKNESS = 0.7, 0.05  # as in decimation, but triangles are small and are to be even; heuristic
 _MAX_IDLE_PASSES = 8  # without a collapse, after which the limit is at the largest cost; then none is left to allow
 
 
@@ -29,7 +30,7 @@ class Reduced:
     labels
         Labels of its edges (E',).
     kept
-        The point of the other surface that each of its points is (V',), ascending.
+        The point of the other surface that each of its points is (V',).
     """
 
     surface: Surface
@@ -69,7 +70,8 @@ def reduce_points(surface: Surface, n_points: int, *, held: PointMask, labels: E
     ----------
     Garland, Heckbert, "Surface simplification using quadric error metrics", 1997.
     """
-    state = decimation_arrays(surface, held | _line_ends(surface, labels), labels, moves=False)
+    stays = held | _line_ends(surface, labels)
+    state = decimation_arrays(surface, stays, labels, moves=False, cosine=_COSINE, thickness=_THICKNESS)
     kernels.set_quadrics(state)
     left, limit = surface.n_points, _quantile_of_costs(state, _FIRST_SHARE)
     number, idle = 0, 0
@@ -79,9 +81,9 @@ def reduce_points(surface: Surface, n_points: int, *, held: PointMask, labels: E
         left, idle = left - count, 0 if count else idle + 1
         limit = max(_GROWTH * limit, _quantile_of_costs(state, 0.0 if idle < 2 else 1.0))
     alive = state.mesh.faces[:, 0] >= 0
-    kept, position = np.unique(state.mesh.faces[alive], return_inverse=True)
-    result = Surface(surface.points[kept], position.reshape(-1, 3).astype(np.int32))
-    return Reduced(surface=result, labels=MarkedSurface.of(result, state.mesh, alive).labels, kept=kept.astype(np.int32))
+    used, position = np.unique(state.mesh.faces[alive], return_inverse=True)
+    result = Surface(state.mesh.points[used], position.reshape(-1, 3).astype(np.int32))
+    return Reduced(surface=result, labels=MarkedSurface.of(result, state.mesh, alive).labels, kept=state.origin[used])
 
 
 def _quantile_of_costs(state: kernels.Decimation, share: float) -> float:
