@@ -143,10 +143,10 @@ def is_oriented(faces, face_edges, counts, balance):
         for corner in range(3):
             upward = faces[face, (corner + 1) % 3] < faces[face, (corner + 2) % 3]
             balance[face_edges[face, corner]] += 1 if upward else -1
+    one_way = 0
     for edge in range(len(counts)):
-        if counts[edge] == 2 and balance[edge] != 0:
-            return False
-    return True
+        one_way += counts[edge] == 2 and balance[edge] != 0
+    return one_way == 0
 
 
 @kernel

@@ -67,11 +67,11 @@ def _push(state, size, p, q, now):
     """Enter the edge p q into the heap, and return the new size."""
     if state.held[p] and state.held[q]:
         return size
-    return push(state.heap, size, _place(state, p, q)[0], p, q, now)
+    return push(state.heap, size, place_between(state, p, q)[0], p, q, now)
 
 
 @kernel
-def _place(state, p, q):
+def place_between(state, p, q):
     """Return the cost of the collapse of the edge p q, and the place of its point."""
     points, quadrics = state.mesh.points, state.quadrics
     total = quadrics[len(quadrics) - 1]
@@ -171,7 +171,7 @@ def _may_collapse(state, gone, n, closed, into):
 
 
 @kernel
-def _collapse(state, p, q):
+def collapse(state, p, q):
     """Collapse the edge p q if that is allowed, and return the point that is left, or -1."""
     mesh, stars = state.mesh, state.stars
     gone, into = (q, p) if state.held[p] or (state.on_line[p] and not state.on_line[q]) else (p, q)
@@ -182,7 +182,7 @@ def _collapse(state, p, q):
     n_into = _may_collapse(state, gone, n_gone, closed, into)
     if n_into < 0:
         return -1
-    place = _place(state, p, q)[1]
+    place = place_between(state, p, q)[1]
     if not _keeps_shapes(state, stars.faces, stars.corners, n_gone, into, place):
         return -1
     if not _keeps_shapes(state, stars.other_faces, stars.other_corners, n_into, gone, place):
@@ -278,50 +278,10 @@ def decimate(state, wanted):
             p, q, made = state.heap.ends[size, 0], state.heap.ends[size, 1], state.heap.made[size]
             if min(state.changed[p], state.changed[q]) < 0 or made < max(state.changed[p], state.changed[q]):
                 continue
-            point = _collapse(state, p, q)
+            point = collapse(state, p, q)
             if point < 0:
                 continue
             progress, count = True, count + 1
             state.changed[point] = count
             size = _push_around(state, size, point, count)
-    return count
-
-
-@kernel
-def costs_of_edges(state, step, costs):
-    """Set the costs of the edges of every so many faces, and return their number."""
-    mesh, count = state.mesh, 0
-    for face in range(0, len(mesh.faces), step):
-        if mesh.faces[face, 0] < 0:
-            continue
-        for side in range(3):
-            p, q = mesh.faces[face, (side + 1) % 3], mesh.faces[face, (side + 2) % 3]
-            if not (state.held[p] and state.held[q]):
-                costs[count] = _place(state, p, q)[0]
-                count += 1
-    return count
-
-
-@kernel
-def collapse_cheap_edges(state, limit, now):
-    """Collapse edges that cost up to a limit, none at a point where one was in this pass, and return their number.
-
-    ``now`` is the number of the pass, from 1 on.
-    """
-    mesh, changed, count = state.mesh, state.changed, 0
-    for face in range(len(mesh.faces)):
-        for side in range(3):
-            if mesh.faces[face, 0] < 0:
-                break
-            if face < mesh.neighbours[face, side]:
-                continue
-            p, q = mesh.faces[face, (side + 1) % 3], mesh.faces[face, (side + 2) % 3]
-            if changed[p] == now or changed[q] == now or (state.held[p] and state.held[q]):
-                continue
-            if _place(state, p, q)[0] > limit:
-                continue
-            point = _collapse(state, p, q)
-            if point >= 0:
-                changed[point] = now
-                count += 1
     return count

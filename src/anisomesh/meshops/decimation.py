@@ -169,6 +169,8 @@ def decimation_arrays(
         face_at=face_at,
         origin=np.arange(n, dtype=np.int32),
         changed=np.zeros(n, dtype=np.int64),
-        heap=EdgeHeap(np.empty(heap_room), np.empty((heap_room, 2), dtype=np.int32), np.empty(heap_room, dtype=np.int64)),
+        heap=EdgeHeap(
+            np.empty(heap_room), np.empty((heap_room, 2), dtype=np.int32), np.empty(heap_room, dtype=np.int64)
+        ),
         stars=Stars(faces, corners, other_faces, other_corners, np.zeros(n, dtype=np.uint8)),
     )

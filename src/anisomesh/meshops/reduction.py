@@ -7,7 +7,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from anisomesh._arrays import EdgeLabels, PointLabels, PointMask
-from anisomesh._kernels import decimate as kernels
+from anisomesh._kernels.decimate import Decimation, set_quadrics
+from anisomesh._kernels.reduce import collapse_cheap_edges, costs_of_edges
 from anisomesh.mesh.marked_surface import MarkedSurface
 from anisomesh.mesh.surface import Surface
 from anisomesh.meshops.decimation import decimation_arrays
@@ -63,8 +64,8 @@ def reduce_points(surface: Surface, n_points: int, *, held: PointMask, labels: E
     Edges are collapsed into one of their ends, by the costs of :func:`~anisomesh.meshops.decimation.decimate`: squared
     distances from the planes of the faces that were there, by quadrics, and a share of the squared length of the edge
     so that triangles become even. In place of one edge after the other in the order of costs, passes over all edges
-    collapse the ones below a limit that grows from pass to pass, and never two at one point. That takes linear time, and
-    the error is hardly larger; as any decimation's it falls with one over the number of points on smooth surfaces.
+    collapse the ones below a limit that grows from pass to pass, and never two at one point. That takes linear time and
+    hardly adds to the error, which on smooth surfaces falls with one over the number of points.
 
     References
     ----------
@@ -72,12 +73,12 @@ def reduce_points(surface: Surface, n_points: int, *, held: PointMask, labels: E
     """
     stays = held | _line_ends(surface, labels)
     state = decimation_arrays(surface, stays, labels, moves=False, cosine=_COSINE, thickness=_THICKNESS)
-    kernels.set_quadrics(state)
+    set_quadrics(state)
     left, limit = surface.n_points, _quantile_of_costs(state, _FIRST_SHARE)
     number, idle = 0, 0
     while left > n_points and idle < _MAX_IDLE_PASSES:
         number += 1
-        count = kernels.collapse_cheap_edges(state, limit, number)
+        count = collapse_cheap_edges(state, limit, number)
         left, idle = left - count, 0 if count else idle + 1
         limit = max(_GROWTH * limit, _quantile_of_costs(state, 0.0 if idle < 2 else 1.0))
     alive = state.mesh.faces[:, 0] >= 0
@@ -86,11 +87,11 @@ def reduce_points(surface: Surface, n_points: int, *, held: PointMask, labels: E
     return Reduced(surface=result, labels=MarkedSurface.of(result, state.mesh, alive).labels, kept=state.origin[used])
 
 
-def _quantile_of_costs(state: kernels.Decimation, share: float) -> float:
+def _quantile_of_costs(state: Decimation, share: float) -> float:
     """Return the cost that a share of the edges does not exceed, from a sample."""
     step = max(1, len(state.mesh.faces) // _SAMPLED_FACES)
     costs = np.empty(3 * (len(state.mesh.faces) // step + 1))
-    count = kernels.costs_of_edges(state, step, costs)
+    count = costs_of_edges(state, step, costs)
     return float(np.quantile(costs[:count], share)) if count else 0.0
 
 

@@ -120,9 +120,7 @@ def unit_of_lengths(options: RemeshOptions, frame: Frame) -> float:
     return 1.0 if options.has_tensors or options.size_field is not None else frame.scale
 
 
-def measure(
-    source: PreparedInput, n: int, options: RemeshOptions, run: Run, *, nearest: bool = False
-) -> Measured:
+def measure(source: PreparedInput, n: int, options: RemeshOptions, run: Run, *, nearest: bool = False) -> Measured:
     """Return the surface and the metric for n vertices; ``nearest`` if the distance counts more than the shape."""
     with run.stage("prepare"):
         source = reduced(source, n, options, nearest=nearest)
@@ -134,7 +132,7 @@ def measure(
         surface, tagged = _with_smooth_borders(surface, source, followed.edges, options.feature_angle)
         creases = sharp_edges(surface, min(options.feature_angle, WEAK_ANGLE))
         creases |= source.fixed[surface.edges].any(axis=1)  # so that the points stay
-        metric = metric_source(options, surface, _prescribed(source, surface, frame, options))
+        metric = metric_source(options, surface, _prescribed(source, surface, frame, options), source.rings)
         spacings = partial(_spacings, metric, n) if prescribes_sizes(options) else None
         split = working_surface(surface, n, creases=creases, tagged=tagged, spacings=spacings)
         tips = split.on_coarse(source.fixed)

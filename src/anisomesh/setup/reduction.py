@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import logging
+import math
 from dataclasses import replace
 
 import numpy as np
@@ -17,10 +18,11 @@ from anisomesh.setup.inputs import PreparedInput
 
 logger = logging.getLogger(__name__)
 
-_POINTS_PER_VERTEX, _POINTS_PER_NEAREST = 12, 36  # of the reduced surface; the second if the distance is what counts
+_POINTS_PER_VERTEX, _POINTS_PER_NEAREST = 16, 48  # of the reduced surface; the second if the distance is what counts
 _LEAST_POINTS = 20_000  # of a reduced surface
 _LEAST_FACTOR = 1.5  # points before over points after: where there are fewer, reducing saves next to nothing
 _MAX_REPEATS = 2  # with points held where faces intersect
+_LEAST_RINGS = 2
 _TAGGED, _BORDER, _SEAM = 1, 2, 4  # bits of the labels of edges
 
 
@@ -42,14 +44,15 @@ def reduced(source: PreparedInput, n_vertices: int, options: RemeshOptions, *, n
     Returns
     -------
     PreparedInput
-        A surface of some of the points, at least twelve for each vertex and 20,000 in all: its distance from the input
+        A surface of some of the points, about sixteen for each vertex or 20,000 in all: its distance from the input
         is a small part of the distance to be expected of the mesh, which falls with one over the vertices. Its topology
         is the same, fixed points and prescribed lines stay, and it intersects itself only where the input does. The
         input itself if it has less than half as many points again, or sheets that are to be joined.
     """
     surface = source.prepared.surface
     wanted = max(_LEAST_POINTS, (_POINTS_PER_NEAREST if nearest else _POINTS_PER_VERTEX) * n_vertices)
-    if surface.n_points <= _LEAST_FACTOR * wanted or source.junctions is not None or _prescribes(source, options):
+    is_dense = options.reduce and surface.n_points > _LEAST_FACTOR * wanted
+    if not is_dense or source.junctions is not None or _prescribes(source, options):
         return source
     result = _reduced_surface(source, wanted)
     if result is None:
@@ -80,7 +83,10 @@ def _reduced_surface(source: PreparedInput, wanted: int) -> Reduced | None:
 
 
 def _on_reduced(source: PreparedInput, result: Reduced) -> PreparedInput:
-    """Return an input on a surface of some of its points."""
+    """Return an input on a surface of some of its points.
+
+    Curvature is fitted over fewer rings of the longer edges, so over about the same part of the surface.
+    """
     surface, kept = result.surface, result.kept
     outline = edge_keys(source.prepared.surface.edges[source.outline])
     prepared = replace(
@@ -98,4 +104,5 @@ def _on_reduced(source: PreparedInput, result: Reduced) -> PreparedInput:
         seams=(result.labels & _SEAM) != 0,
         fixed=source.fixed[kept],
         outline=np.isin(edge_keys(kept[surface.edges]), outline),
+        rings=max(_LEAST_RINGS, round(source.rings * math.sqrt(len(kept) / source.prepared.surface.n_points))),
     )
