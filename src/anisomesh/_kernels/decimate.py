@@ -14,6 +14,21 @@ _MAX_STEP = 1.0  # edge lengths from the middle of an edge to the place of its p
 _WALL_WEIGHT = 3.0  # of an edge of the boundary or a crease, in squared lengths; heuristic
 
 
+class ShapeLimits(NamedTuple):
+    """What a collapse may do to a triangle.
+
+    Attributes
+    ----------
+    cosine
+        Least cosine between its normals before and after.
+    thickness
+        Least area over squared longest side, unless there was a thinner triangle.
+    """
+
+    cosine: float
+    thickness: float
+
+
 class Decimation(NamedTuple):
     """A mesh that is decimated.
 
@@ -31,10 +46,8 @@ class Decimation(NamedTuple):
         Whether other points go to where their quadrics are lowest, and not to one of two.
     evenness
         Weight of squared lengths beside squared distances: short edges go first.
-    cosine
-        Least cosine between the normals of a triangle before and after a collapse.
-    thickness
-        Least area over squared longest side of a new triangle, unless there was a thinner one.
+    limits
+        What a collapse may do to triangles.
     face_at
         One of the faces at each point (V,).
     origin
@@ -53,8 +66,7 @@ class Decimation(NamedTuple):
     on_line: Any
     moves: Any
     evenness: Any
-    cosine: Any
-    thickness: Any
+    limits: Any
     face_at: Any
     origin: Any
     changed: Any
@@ -123,9 +135,9 @@ def _keeps_shapes(state, faces, corners, n, other, place):
         a, b = coordinates(mesh.points, first), coordinates(mesh.points, second)
         old, thin = _thickness(point, a, b)
         new, thickness = _thickness(place, a, b)
-        if not thickness >= min(thin, state.thickness):
+        if not thickness >= min(thin, state.limits.thickness):
             return False
-        if not dot(old, new) >= state.cosine * length(old) * length(new) or not thickness > 0.0:
+        if not dot(old, new) >= state.limits.cosine * length(old) * length(new) or not thickness > 0.0:
             return False
     return True
 

@@ -111,23 +111,15 @@ def count_nonmanifold_edges(faces: Faces) -> int:
     return int((np.bincount(edges_of(faces)[1].ravel()) > 2).sum())
 
 
-def nonmanifold_points(faces: Faces) -> Indices:
-    """Return the points whose faces do not form a single fan.
-
-    These are the ends of edges with more than two faces and points where several fans meet.
-    """
+def count_nonmanifold_points(faces: Faces) -> int:
+    """Return the number of points that are ends of edges with more than two faces, or whose faces form several fans."""
     edges, face_edges = edges_of(faces)
     n_fans, fans = corner_fans(faces, side_pairs(faces))
     point_of_fan = np.empty(n_fans, dtype=np.int64)
     point_of_fan[fans] = faces.ravel()
     nonmanifold = np.bincount(point_of_fan) > 1
     nonmanifold[edges[np.bincount(face_edges.ravel()) > 2]] = True
-    return np.flatnonzero(nonmanifold).astype(np.int32)
-
-
-def count_nonmanifold_points(faces: Faces) -> int:
-    """Return the number of points whose faces do not form a single fan."""
-    return len(nonmanifold_points(faces))
+    return int(np.count_nonzero(nonmanifold))
 
 
 def is_oriented(faces: Faces) -> bool:

@@ -21,7 +21,7 @@ from anisomesh.meshops.held import points_near_faces
 _STAR_ROOM = 4_096  # faces around a point; a point with more, as in the middle of a fan, stays
 _MAX_REPEATS = 4  # with points held where triangles were inverted
 _LEAST_EVENNESS, _EVENNESS = 1e-9, 1e-3  # weight of squared lengths where points move, and where not; heuristic
-_COSINE, _THICKNESS = 0.2, 1e-4  # of normals of a triangle before and after, and of a new one; heuristic
+_SHAPE_LIMITS = kernels.ShapeLimits(cosine=0.2, thickness=1e-4)  # heuristic
 _HEAP_ROOM = 12  # entries for each point, half of which are all edges at the start
 
 
@@ -143,8 +143,7 @@ def decimation_arrays(
     *,
     moves: bool,
     heap_room: int = 0,
-    cosine: float = _COSINE,
-    thickness: float = _THICKNESS,
+    limits: kernels.ShapeLimits = _SHAPE_LIMITS,
 ) -> kernels.Decimation:
     """Return the arrays that the kernels work on, with room for entries in the heap of edges.
 
@@ -164,8 +163,7 @@ def decimation_arrays(
         on_line=(surface.on_boundary | on_crease).astype(np.uint8),
         moves=moves,
         evenness=_LEAST_EVENNESS if moves else _EVENNESS,
-        cosine=cosine,
-        thickness=thickness,
+        limits=limits,
         face_at=face_at,
         origin=np.arange(n, dtype=np.int32),
         changed=np.zeros(n, dtype=np.int64),

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from anisomesh._arrays import EdgeLabels, PointLabels, PointMask
-from anisomesh._kernels.decimate import Decimation, set_quadrics
+from anisomesh._kernels.decimate import Decimation, ShapeLimits, set_quadrics
 from anisomesh._kernels.reduce import collapse_cheap_edges, costs_of_edges
 from anisomesh.mesh.marked_surface import MarkedSurface
 from anisomesh.mesh.surface import Surface
@@ -16,7 +16,7 @@ from anisomesh.meshops.decimation import decimation_arrays
 _SAMPLED_FACES = 20_000  # whose edges say how large costs are
 _FIRST_SHARE = 0.2  # of the edges that the first pass may collapse; heuristic
 _GROWTH = 1.25  # of the largest cost from pass to pass; heuristic
-_COSINE, _THICKNESS = 0.7, 0.05  # as in decimation, but triangles are small and are to be even; heuristic
+_FINE_LIMITS = ShapeLimits(cosine=0.7, thickness=0.05)  # for triangles that are small, and are to be even; heuristic
 _MAX_IDLE_PASSES = 8  # without a collapse, after which the limit is at the largest cost; then none is left to allow
 
 
@@ -72,7 +72,7 @@ def reduce_points(surface: Surface, n_points: int, *, held: PointMask, labels: E
     Garland, Heckbert, "Surface simplification using quadric error metrics", 1997.
     """
     stays = held | _line_ends(surface, labels)
-    state = decimation_arrays(surface, stays, labels, moves=False, cosine=_COSINE, thickness=_THICKNESS)
+    state = decimation_arrays(surface, stays, labels, moves=False, limits=_FINE_LIMITS)
     set_quadrics(state)
     left, limit = surface.n_points, _quantile_of_costs(state, _FIRST_SHARE)
     number, idle = 0, 0

@@ -21,7 +21,7 @@ logger = logging.getLogger(__name__)
 _POINTS_PER_VERTEX, _POINTS_PER_NEAREST = 16, 48  # of the reduced surface; the second if the distance is what counts
 _LEAST_POINTS = 20_000  # of a reduced surface
 _LEAST_FACTOR = 1.5  # points before over points after: where there are fewer, reducing saves next to nothing
-_MAX_REPEATS = 2  # with points held where faces intersect
+_MAX_RETRIES = 2  # with points held where faces intersect
 _LEAST_RINGS = 2
 _TAGGED, _BORDER, _SEAM = 1, 2, 4  # bits of the labels of edges
 
@@ -73,7 +73,7 @@ def _reduced_surface(source: PreparedInput, wanted: int) -> Reduced | None:
     surface = source.prepared.surface
     labels = _TAGGED * source.tagged + _BORDER * source.borders + _SEAM * source.seams
     held: PointMask = np.array(source.fixed)
-    for repeat in range(_MAX_REPEATS + 1):
+    for repeat in range(_MAX_RETRIES + 1):
         result = reduce_points(surface, wanted, held=held, labels=labels.astype(np.int32))
         pairs = self_intersections(result.surface)
         if len(pairs) == 0 or (repeat == 0 and len(self_intersections(surface)) > 0):
