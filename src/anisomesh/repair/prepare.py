@@ -150,8 +150,7 @@ def prepare(surface: Surface, *, weld_tolerance: float | Literal["auto"] = 0.0) 
     source = passes[0].source
     for later in passes[1:]:
         source = source[later.source]
-    n_used = np.count_nonzero(topology.used_points(surface.faces, surface.n_points))
-    n_sources = np.count_nonzero(topology.used_points(source, surface.n_points))
+    n_used, n_sources = (int(topology.used_points(each, surface.n_points).sum()) for each in (surface.faces, source))
     report = PrepareReport(
         points_welded=max(n_used - n_sources, 0),
         faces_degenerate=sum(each.n_degenerate for each in passes),
