@@ -82,6 +82,9 @@ class RemeshOptions:
     denoise
         Whether noise that a network or filters find in the input is removed first. Designed surfaces, on which a tenth
         of the edges or more are flat, are left as they are.
+    reduce
+        Whether an input with more than 24 points for each vertex asked for is first reduced to about 16, unless a
+        metric, sizes or a density are prescribed or sheets are to be joined.
     fit
         Whether the mesh is fitted to the input at the end: vertices move and edges are flipped such that distance and
         shape of the triangles get better together. Without it the result is the dual of the tessellation, as in the
@@ -139,6 +142,7 @@ class RemeshOptions:
     weights: str | os.PathLike[str] | None = None
     device: str = "cpu"
     denoise: bool = True
+    reduce: bool = True
     fit: bool = True
     shape_weight: float = 1.0
     seed: int = 0
@@ -171,7 +175,7 @@ class RemeshOptions:
             raise OptionError(f"time_limit = {self.time_limit}; expected a positive number of seconds")
         if self.threads > MAX_THREADS:
             raise OptionError(f"threads = {self.threads}; expected at most {MAX_THREADS}")
-        for name in ("denoise", "fit", "regions", "attributes"):
+        for name in ("denoise", "reduce", "fit", "regions", "attributes"):
             if not isinstance(getattr(self, name), bool):
                 raise OptionError(f"{name} = {getattr(self, name)!r}; expected True or False")
         if not isinstance(self.weights, str | os.PathLike | None):

@@ -237,7 +237,9 @@ def _remesh(cut: Cut, n: int, options: RemeshOptions, run: Run, manner: Manner) 
     mesh, optimised = made.mesh, made.optimised
     is_joined = cut.whole.junctions is not None and (junctions is None or made.joined)
     agreement = _agreement(mesh, tasks, asked) if asked or task.error_weights is not None else None
-    rest, reference = (Surface(source.to_model(each.points, frame), each.faces) for each in (mesh, measured.surface))
+    rest, reference = (
+        Surface(measured.source.to_model(each.points, frame), each.faces) for each in (mesh, measured.surface)
+    )
     surface, validity = cut.checked(rest, reference, made.validity, run.deadline)
     result = RemeshResult(
         surface=surface,

@@ -13,6 +13,7 @@ from anisomesh.features.detect import share_of_flat_edges
 from anisomesh.fitting.fit import SAMPLES_PER_VERTEX, FitOptions, FitPlan
 from anisomesh.learn.inference.source import Hybrid, Neural
 from anisomesh.mesh.surface import Surface
+from anisomesh.metric.curvature import DEFAULT_RADIUS
 from anisomesh.metric.field import MetricSource
 from anisomesh.metric.sources import Approximation, Curvature, Uniform
 from anisomesh.options import RemeshOptions
@@ -29,10 +30,10 @@ _NEAREST_DECIMATION = FitOptions(price=10.0, exchange_price=2.0, rounds=3, min_q
 _ITERATIONS, _ITERATIONS_BEFORE_FIT = 150, 50  # of L-BFGS at most; the second from training meshes
 _WARM_LLOYD, _WARM_ITERATIONS = 2, 24  # the same from sites of a finer level of detail; chosen on training meshes
 _WARM_SAMPLES = 25  # per vertex in the fit then, on measured surfaces; parts have fillets that fewer miss
-_BUILT_IN: dict[str, Callable[[float], MetricSource]] = {
-    "curvature": lambda crease_angle: Curvature(crease_angle=crease_angle),
-    "approximation": lambda crease_angle: Approximation(crease_angle=crease_angle),
-    "uniform": lambda crease_angle: Uniform(),
+_BUILT_IN: dict[str, Callable[[float, int], MetricSource]] = {
+    "curvature": lambda crease_angle, radius: Curvature(crease_angle=crease_angle, radius=radius),
+    "approximation": lambda crease_angle, radius: Approximation(crease_angle=crease_angle, radius=radius),
+    "uniform": lambda crease_angle, radius: Uniform(),
 }
 _NAMES_OF_SOURCES: dict[type, str] = {
     Hybrid: "hybrid",
@@ -77,7 +78,9 @@ def is_designed(surface: Surface) -> bool:
     return share_of_flat_edges(surface) >= DESIGNED_SHARE
 
 
-def metric_source(options: RemeshOptions, surface: Surface, prescribed: MetricSource | None) -> MetricSource:
+def metric_source(
+    options: RemeshOptions, surface: Surface, prescribed: MetricSource | None, radius: int = DEFAULT_RADIUS
+) -> MetricSource:
     """Return the metric source that the options name.
 
     Parameters
@@ -88,6 +91,8 @@ def metric_source(options: RemeshOptions, surface: Surface, prescribed: MetricSo
         The prepared input: noise is never removed from a designed surface.
     prescribed
         The source of a metric that the options prescribe at the points of the input.
+    radius
+        Rings of edges over which curvature is fitted.
     """
     if prescribed is not None:
         return prescribed
@@ -95,11 +100,11 @@ def metric_source(options: RemeshOptions, surface: Surface, prescribed: MetricSo
     if not callable(metric):
         if name in ("neural", "hybrid"):
             given = (options.weights, options.device, options.denoise)
-            metric = Hybrid(*given, options.feature_angle) if name == "hybrid" else Neural(*given)
+            metric = Hybrid(*given, options.feature_angle, radius) if name == "hybrid" else Neural(*given)
         elif name == "filtered":
             metric = Filtered(options.denoise, options.feature_angle)
         else:
-            return _BUILT_IN[str(metric)](options.feature_angle)
+            return _BUILT_IN[str(metric)](options.feature_angle, radius)
     if isinstance(metric, Neural | Filtered):
         denoise = metric.denoise and options.denoise and not is_designed(surface)
         return replace(metric, denoise=denoise)

@@ -12,8 +12,21 @@ from .vectors import coordinates, cross, dot, length, squared_length, subtract, 
 _PULL = 1e-6  # towards the middle of an edge, where the planes leave the place open
 _MAX_STEP = 1.0  # edge lengths from the middle of an edge to the place of its point
 _WALL_WEIGHT = 3.0  # of an edge of the boundary or a crease, in squared lengths; heuristic
-_MIN_COSINE = 0.2  # between the normals of a triangle before and after a collapse; heuristic
-_MIN_THICKNESS = 1e-4  # area over squared longest side of a new triangle, unless there was a thinner one; heuristic
+
+
+class ShapeLimits(NamedTuple):
+    """What a collapse may do to a triangle.
+
+    Attributes
+    ----------
+    cosine
+        Least cosine between its normals before and after.
+    thickness
+        Least area over squared longest side, unless there was a thinner triangle.
+    """
+
+    cosine: float
+    thickness: float
 
 
 class Decimation(NamedTuple):
@@ -33,8 +46,12 @@ class Decimation(NamedTuple):
         Whether other points go to where their quadrics are lowest, and not to one of two.
     evenness
         Weight of squared lengths beside squared distances: short edges go first.
+    limits
+        What a collapse may do to triangles.
     face_at
         One of the faces at each point (V,).
+    origin
+        The point (V,) at whose place each one was at the start; without moves it is there now.
     changed
         The number of collapses after which each point was changed last (V,); -1 if it is gone.
     heap
@@ -49,7 +66,9 @@ class Decimation(NamedTuple):
     on_line: Any
     moves: Any
     evenness: Any
+    limits: Any
     face_at: Any
+    origin: Any
     changed: Any
     heap: Any
     stars: Any
@@ -60,11 +79,11 @@ def _push(state, size, p, q, now):
     """Enter the edge p q into the heap, and return the new size."""
     if state.held[p] and state.held[q]:
         return size
-    return push(state.heap, size, _place(state, p, q)[0], p, q, now)
+    return push(state.heap, size, place_between(state, p, q)[0], p, q, now)
 
 
 @kernel
-def _place(state, p, q):
+def place_between(state, p, q):
     """Return the cost of the collapse of the edge p q, and the place of its point."""
     points, quadrics = state.mesh.points, state.quadrics
     total = quadrics[len(quadrics) - 1]
@@ -116,9 +135,9 @@ def _keeps_shapes(state, faces, corners, n, other, place):
         a, b = coordinates(mesh.points, first), coordinates(mesh.points, second)
         old, thin = _thickness(point, a, b)
         new, thickness = _thickness(place, a, b)
-        if not thickness >= min(thin, _MIN_THICKNESS):
+        if not thickness >= min(thin, state.limits.thickness):
             return False
-        if not dot(old, new) >= _MIN_COSINE * length(old) * length(new) or not thickness > 0.0:
+        if not dot(old, new) >= state.limits.cosine * length(old) * length(new) or not thickness > 0.0:
             return False
     return True
 
@@ -164,7 +183,7 @@ def _may_collapse(state, gone, n, closed, into):
 
 
 @kernel
-def _collapse(state, p, q):
+def collapse(state, p, q):
     """Collapse the edge p q if that is allowed, and return the point that is left, or -1."""
     mesh, stars = state.mesh, state.stars
     gone, into = (q, p) if state.held[p] or (state.on_line[p] and not state.on_line[q]) else (p, q)
@@ -175,7 +194,7 @@ def _collapse(state, p, q):
     n_into = _may_collapse(state, gone, n_gone, closed, into)
     if n_into < 0:
         return -1
-    place = _place(state, p, q)[1]
+    place = place_between(state, p, q)[1]
     if not _keeps_shapes(state, stars.faces, stars.corners, n_gone, into, place):
         return -1
     if not _keeps_shapes(state, stars.other_faces, stars.other_corners, n_into, gone, place):
@@ -193,6 +212,8 @@ def _collapse(state, p, q):
             _note_face(state, stars.other_faces[k])
     for k in range(10):
         state.quadrics[into, k] += state.quadrics[gone, k]
+    if place == coordinates(mesh.points, gone):
+        state.origin[into] = state.origin[gone]
     mesh.points[into, 0], mesh.points[into, 1], mesh.points[into, 2] = place
     state.changed[gone] = -1
     return into
@@ -269,7 +290,7 @@ def decimate(state, wanted):
             p, q, made = state.heap.ends[size, 0], state.heap.ends[size, 1], state.heap.made[size]
             if min(state.changed[p], state.changed[q]) < 0 or made < max(state.changed[p], state.changed[q]):
                 continue
-            point = _collapse(state, p, q)
+            point = collapse(state, p, q)
             if point < 0:
                 continue
             progress, count = True, count + 1

@@ -105,6 +105,10 @@ REMESH_OPTIONS: dict[str, Any] = {
         bool,
         _option("--denoise/--keep-noise", help="Remove noise that is found in a scan, or keep it."),
     ],
+    "reduce": Annotated[
+        bool,
+        _option("--reduce/--no-reduce", help="Reduce an input with far more points than the result first, or do not."),
+    ],
     "regions": Annotated[
         bool,
         _option(

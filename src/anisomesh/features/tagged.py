@@ -46,6 +46,8 @@ def tagged_edges(
     points that lie on them, so the edges along one that is gone are its parts.
     """
     ends = checked_pairs(input_mesh, pairs)
+    if len(ends) == 0:
+        return np.zeros(len(prepared.edges), dtype=bool)
     tree = cKDTree(prepared.points)
     keys = edge_keys(prepared.edges)
     radius = search_radius(input_mesh, tolerance)

@@ -11,6 +11,7 @@ from scipy import sparse
 from scipy.sparse import csgraph
 
 from anisomesh._arrays import EdgeIndices, Edges, FaceIndices, FaceLabels, Faces, Indices, PointMask
+from anisomesh._kernels import connectivity
 
 
 def half_edges(faces: Faces) -> npt.NDArray[np.int32]:
@@ -25,30 +26,30 @@ def edge_keys(ends: npt.NDArray[np.integer]) -> npt.NDArray[np.int64]:
 
 
 def edges_of(faces: Faces) -> tuple[Edges, FaceIndices]:
-    """Return the unique edges (E, 2), lower index first, and the edge opposite each corner (F, 3)."""
-    unique, inverse = np.unique(edge_keys(half_edges(faces)), return_inverse=True)
-    edges = np.stack([unique >> 32, unique & 0xFFFFFFFF], axis=1).astype(np.int32)
-    return edges, inverse.reshape(-1, 3).astype(np.int32)
+    """Return the unique edges (E, 2), lower index first, in order, and the edge opposite each corner (F, 3)."""
+    faces = np.array(faces, dtype=np.int32)  # of one type and layout, for which the kernels are compiled
+    n_points = int(faces.max()) + 1 if len(faces) else 0
+    first = np.zeros(n_points + 1, dtype=np.int64)
+    position = np.empty(n_points, dtype=np.int64)
+    sides, ends, edge_of_side = (np.empty(faces.size, dtype=np.int32) for _ in range(3))
+    connectivity.count_sides(faces, first)
+    connectivity.sort_sides(faces, first, position, sides, ends)
+    edges = np.empty((faces.size, 2), dtype=np.int32)
+    count = connectivity.number_edges(first, sides, ends, edges, edge_of_side)
+    return edges[:count].copy(), edge_of_side.reshape(-1, 3)
 
 
 def edge_faces(face_edges: FaceIndices, n_edges: int) -> EdgeIndices:
     """Return the faces at each edge (E, 2): the second is -1 at a boundary edge, both are -1 at a non-manifold edge."""
-    flat = face_edges.ravel()
-    order = np.argsort(flat, kind="stable")
-    count = np.bincount(flat, minlength=n_edges)
-    start = np.cumsum(count) - count
-    result = np.full((n_edges, 2), -1, dtype=np.int32)
-    one, two = count == 1, count == 2
-    result[one | two, 0] = order[start[one | two]] // 3
-    result[two, 1] = order[start[two] + 1] // 3
-    return result
+    pairs = np.full((n_edges, 2), -1, dtype=np.int32)
+    connectivity.edge_faces(face_edges, np.zeros(n_edges, dtype=np.int32), pairs)
+    return pairs
 
 
 def face_neighbours(face_edges: FaceIndices, edge_faces: EdgeIndices) -> FaceIndices:
     """Return the face across each side (F, 3); -1 at boundary and non-manifold edges."""
-    pairs = edge_faces[face_edges]
-    own = np.arange(len(face_edges), dtype=np.int32)[:, None]
-    across: FaceIndices = np.where(pairs[:, :, 0] == own, pairs[:, :, 1], pairs[:, :, 0]).astype(np.int32)
+    across = np.empty_like(face_edges)
+    connectivity.face_neighbours(face_edges, edge_faces, across)
     return across
 
 
@@ -101,7 +102,8 @@ def connected_components(faces: Faces, n_points: int) -> tuple[int, FaceLabels]:
 
 def euler_characteristic(faces: Faces) -> int:
     """Return V - E + F, where V counts only points that are used by a face."""
-    return len(np.unique(faces)) - len(edges_of(faces)[0]) + len(faces)
+    n_points = np.count_nonzero(used_points(faces, int(faces.max()) + 1))
+    return int(n_points) - len(edges_of(faces)[0]) + len(faces)
 
 
 def count_nonmanifold_edges(faces: Faces) -> int:
@@ -109,32 +111,38 @@ def count_nonmanifold_edges(faces: Faces) -> int:
     return int((np.bincount(edges_of(faces)[1].ravel()) > 2).sum())
 
 
-def nonmanifold_points(faces: Faces) -> Indices:
-    """Return the points whose faces do not form a single fan.
-
-    These are the ends of edges with more than two faces and points where several fans meet.
-    """
+def count_nonmanifold_points(faces: Faces) -> int:
+    """Return the number of points that are ends of edges with more than two faces, or whose faces form several fans."""
     edges, face_edges = edges_of(faces)
     n_fans, fans = corner_fans(faces, side_pairs(faces))
     point_of_fan = np.empty(n_fans, dtype=np.int64)
     point_of_fan[fans] = faces.ravel()
     nonmanifold = np.bincount(point_of_fan) > 1
     nonmanifold[edges[np.bincount(face_edges.ravel()) > 2]] = True
-    return np.flatnonzero(nonmanifold).astype(np.int32)
-
-
-def count_nonmanifold_points(faces: Faces) -> int:
-    """Return the number of points whose faces do not form a single fan."""
-    return len(nonmanifold_points(faces))
+    return int(np.count_nonzero(nonmanifold))
 
 
 def is_oriented(faces: Faces) -> bool:
     """Return whether the faces are consistently oriented: each edge with two faces has one side in each direction."""
-    face_edges = edges_of(faces)[1].ravel()
-    sides = half_edges(faces)
-    upward = (sides[:, 0] < sides[:, 1]).astype(np.int64)
-    count = np.bincount(face_edges)
-    return bool((np.bincount(face_edges, upward)[count == 2] == 1).all())
+    edges, face_edges = edges_of(faces)
+    counts = np.bincount(face_edges.ravel(), minlength=len(edges)).astype(np.int32)
+    return bool(connectivity.is_oriented(faces, face_edges, counts, np.zeros(len(edges), dtype=np.int32)))
+
+
+def has_single_fans(faces: Faces, neighbours: FaceIndices) -> bool:
+    """Return whether the faces at each point form one fan, if edges have at most two faces, which are oriented.
+
+    ``neighbours`` are the faces across the sides (F, 3), as :func:`face_neighbours` returns them.
+    """
+    n_faces = np.zeros(int(faces.max()) + 1, dtype=np.int32)
+    return bool(connectivity.has_single_fans(faces, neighbours, n_faces))
+
+
+def used_points(faces: Faces, n_points: int) -> PointMask:
+    """Return which points (n_points,) faces use."""
+    used = np.zeros(n_points, dtype=bool)
+    used[faces] = True
+    return used
 
 
 def boundary_loops(faces: Faces) -> list[Indices]:

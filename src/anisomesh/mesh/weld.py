@@ -28,6 +28,8 @@ def coincident(points: Points, tolerance: float = 0.0) -> PointLabels:
         sorted_points = points[order]
         differs = np.ones(len(points), dtype=np.int64)
         differs[1:] = (sorted_points[1:] != sorted_points[:-1]).any(axis=1)
+        if differs.all():
+            return np.arange(len(points), dtype=np.int32)
         group = np.empty(len(points), dtype=np.int32)
         group[order] = np.cumsum(differs) - 1
     lowest = np.full(len(points), len(points), dtype=np.int64)

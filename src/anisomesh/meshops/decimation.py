@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from anisomesh._arrays import EdgeEnds, PointMask
+from anisomesh._arrays import EdgeEnds, EdgeLabels, PointMask
 from anisomesh._kernels import decimate as kernels
 from anisomesh._kernels.heap import EdgeHeap
 from anisomesh._kernels.stars import Stars
@@ -21,6 +21,7 @@ from anisomesh.meshops.held import points_near_faces
 _STAR_ROOM = 4_096  # faces around a point; a point with more, as in the middle of a fan, stays
 _MAX_REPEATS = 4  # with points held where triangles were inverted
 _LEAST_EVENNESS, _EVENNESS = 1e-9, 1e-3  # weight of squared lengths where points move, and where not; heuristic
+_SHAPE_LIMITS = kernels.ShapeLimits(cosine=0.2, thickness=1e-4)  # heuristic
 _HEAP_ROOM = 12  # entries for each point, half of which are all edges at the start
 
 
@@ -117,7 +118,9 @@ def _collapsed(surface: Surface, n_points: int, held: PointMask, creases: EdgeEn
     surplus = surface.n_points - n_points
     if surplus <= 0:
         return Decimated(surface=surface, crease_edges=creases)
-    state = _arrays(surface, held, creases, moves=moves)
+    labels = np.isin(edge_keys(surface.edges), edge_keys(creases)).astype(np.int32)
+    ends = ends_of_creases(creases, surface.n_points)
+    state = decimation_arrays(surface, held | ends, labels, moves=moves, heap_room=_HEAP_ROOM * surface.n_points)
     kernels.set_quadrics(state)
     kernels.decimate(state, surplus)
     alive = state.mesh.faces[:, 0] >= 0
@@ -133,25 +136,39 @@ def ends_of_creases(crease_edges: EdgeEnds, n_points: int) -> PointMask:
     return np.asarray((count != 0) & (count != 2))
 
 
-def _arrays(surface: Surface, held: PointMask, creases: EdgeEnds, *, moves: bool) -> kernels.Decimation:
-    """Return the arrays that the kernels work on."""
+def decimation_arrays(
+    surface: Surface,
+    held: PointMask,
+    labels: EdgeLabels,
+    *,
+    moves: bool,
+    heap_room: int = 0,
+    limits: kernels.ShapeLimits = _SHAPE_LIMITS,
+) -> kernels.Decimation:
+    """Return the arrays that the kernels work on, with room for entries in the heap of edges.
+
+    Edges (E,) of another label than 0 form creases; ``held`` points (V,) stay, and so do points of the boundary on
+    creases inside.
+    """
     n = surface.n_points
-    labels = np.isin(edge_keys(surface.edges), edge_keys(creases)).astype(np.int32)
     on_crease = np.zeros(n, dtype=bool)
-    on_crease[creases[~np.isin(edge_keys(creases), edge_keys(surface.edges[surface.edge_face_count == 1]))]] = True
+    on_crease[surface.edges[(labels != 0) & (surface.edge_face_count != 1)]] = True
     face_at = np.zeros(n, dtype=np.int32)
     face_at[surface.faces] = np.arange(surface.n_faces, dtype=np.int32)[:, None]
-    size = _HEAP_ROOM * n
     faces, corners, other_faces, other_corners = np.zeros((4, _STAR_ROOM), dtype=np.int32)
     return kernels.Decimation(
         mesh=MarkedSurface.unmoved(surface, labels).triangulation(surface.n_faces),
         quadrics=np.zeros((n + 1, 10)),
-        held=(ends_of_creases(creases, n) | (surface.on_boundary & on_crease) | held).astype(np.uint8),
+        held=((surface.on_boundary & on_crease) | held).astype(np.uint8),
         on_line=(surface.on_boundary | on_crease).astype(np.uint8),
         moves=moves,
         evenness=_LEAST_EVENNESS if moves else _EVENNESS,
+        limits=limits,
         face_at=face_at,
+        origin=np.arange(n, dtype=np.int32),
         changed=np.zeros(n, dtype=np.int64),
-        heap=EdgeHeap(np.empty(size), np.empty((size, 2), dtype=np.int32), np.empty(size, dtype=np.int64)),
+        heap=EdgeHeap(
+            np.empty(heap_room), np.empty((heap_room, 2), dtype=np.int32), np.empty(heap_room, dtype=np.int64)
+        ),
         stars=Stars(faces, corners, other_faces, other_corners, np.zeros(n, dtype=np.uint8)),
     )

@@ -6,9 +6,11 @@ import numpy as np
 import numpy.typing as npt
 
 from anisomesh._arrays import FaceMask, Faces, Floats, Points
+from anisomesh._kernels import degenerate as kernels
 from anisomesh.mesh import geometry, topology
 
 _DEGENERATE_RATIO = 1e-14  # 2 area over longest side^2 of degenerate faces: above the rounding error of the area
+_THIN_FACTOR = 2.0  # times that ratio for faces that are looked at closely, beyond all rounding
 _MAX_REMOVAL_ROUNDS = 100  # bounds the time on meshes with long chains of caps; heuristic
 
 
@@ -63,8 +65,12 @@ def remove_degenerate(
 
 def is_degenerate(points: Points, faces: Faces) -> FaceMask:
     """Return which faces (F,) have a repeated point or no area."""
-    points = _scaled(points)
-    return np.asarray(_has_repeated_point(faces) | _has_no_area(points, faces, _side_lengths(points, faces)))
+    points, faces = _scaled(points), np.array(faces, dtype=np.int32)
+    found = np.empty(len(faces), dtype=bool)
+    kernels.thin_faces(points, faces, _THIN_FACTOR * _DEGENERATE_RATIO, found)
+    thin = faces[found]
+    found[found] = _has_repeated_point(thin) | _has_no_area(points, thin, _side_lengths(points, thin))
+    return found
 
 
 def _scaled(points: Points) -> Points:

@@ -150,7 +150,7 @@ def prepare(surface: Surface, *, weld_tolerance: float | Literal["auto"] = 0.0) 
     source = passes[0].source
     for later in passes[1:]:
         source = source[later.source]
-    n_used, n_sources = len(np.unique(surface.faces)), len(np.unique(source))
+    n_used, n_sources = (int(topology.used_points(each, surface.n_points).sum()) for each in (surface.faces, source))
     report = PrepareReport(
         points_welded=max(n_used - n_sources, 0),
         faces_degenerate=sum(each.n_degenerate for each in passes),
@@ -257,7 +257,7 @@ def _check_tolerance(surface: Surface, tolerance: float) -> None:
 
 def _weld(surface: Surface, tolerance: float) -> PointLabels:
     """Return the lowest coincident point of every point (V,); unused points are ignored."""
-    used = np.unique(surface.faces)
+    used = np.flatnonzero(topology.used_points(surface.faces, surface.n_points))
     labels = np.arange(surface.n_points, dtype=np.int32)
     labels[used] = used[coincident(surface.points[used], tolerance)]
     return labels
@@ -265,18 +265,29 @@ def _weld(surface: Surface, tolerance: float) -> PointLabels:
 
 def _is_clean(surface: Surface, labels: PointLabels, tolerance: float) -> bool:
     """Return whether no repair is needed; coincident points are accepted unless welding them would close a gap."""
-    faces, used = surface.faces, np.unique(surface.faces)
-    if len(used) < surface.n_points or surface.edge_face_count.max() > 2 or not topology.is_oriented(faces):
+    faces = surface.faces
+    if not topology.used_points(faces, surface.n_points).all() or surface.edge_face_count.max() > 2:
         return False
-    open_sides = surface.edge_face_count[surface.face_edges.ravel()] == 1
-    gaps = topology.edges_of(labels[faces])[1].ravel()[open_sides]
+    across = surface.face_neighbours
+    is_twin = (across[:, 0] == across[:, 1]) & (across[:, 0] >= 0)  # of its neighbour: they have the same three points
     return bool(
-        len(np.unique(gaps)) == len(gaps)
-        and topology.count_nonmanifold_points(faces) == 0
+        topology.is_oriented(faces)
+        and topology.has_single_fans(faces, across)
+        and not is_twin.any()
         and not degenerate.is_degenerate(surface.points, labels[faces]).any()
-        and duplicates.select_unique_faces(faces).all()
-        and t_junctions.split_at_t_junctions(surface.points, faces, labels, tolerance).n_split == 0
+        and _leaves_open(surface, labels, tolerance)
     )
+
+
+def _leaves_open(surface: Surface, labels: PointLabels, tolerance: float) -> bool:
+    """Return whether welding points, and splitting sides at T-junctions, would close no gap."""
+    open_sides = surface.edge_face_count[surface.face_edges.ravel()] == 1
+    if not open_sides.any():
+        return True
+    gaps = topology.edges_of(labels[surface.faces])[1].ravel()[open_sides]
+    if len(np.unique(gaps)) < len(gaps):
+        return False
+    return t_junctions.split_at_t_junctions(surface.points, surface.faces, labels, tolerance).n_split == 0
 
 
 def _order_points(faces: Faces, n_points: int, corner_point: Indices) -> tuple[PointLabels, Faces]:

@@ -20,6 +20,7 @@ from anisomesh.mesh.closest_points import ClosestPoints
 from anisomesh.mesh.geometry import Frame, even_edge_length
 from anisomesh.mesh.surface import Surface
 from anisomesh.meshops.anchors import Anchors, places_found
+from anisomesh.metric.curvature import DEFAULT_RADIUS
 from anisomesh.metric.sizes import checked_sizes
 from anisomesh.metric.solution.source import SolutionMetric, checked_values
 from anisomesh.metric.tensors import validate_metric
@@ -78,6 +79,8 @@ class PreparedInput:
         Which of its edges (E,) stay as they are: edges of the boundary between fixed points.
     least
         Vertices that a mesh has at least.
+    rings
+        Rings of edges over which curvature is fitted.
     """
 
     prepared: Prepared
@@ -92,6 +95,7 @@ class PreparedInput:
     fixed: PointMask
     outline: EdgeMask
     least: int = MIN_VERTICES
+    rings: int = DEFAULT_RADIUS
 
     def checked_count(self, n_vertices: int) -> int:
         """Return a number of vertices, or raise OptionError if more points are kept."""

@@ -28,6 +28,7 @@ from anisomesh.metric.transfer import PlacedMetric, field_near
 from anisomesh.options import MIN_VERTICES, RemeshOptions
 from anisomesh.resolve import follows_creases, is_designed, metric_source, prescribes_sizes, with_embedding_chosen
 from anisomesh.setup.inputs import PreparedInput
+from anisomesh.setup.reduction import reduced
 
 logger = logging.getLogger(__name__)
 
@@ -42,6 +43,8 @@ class Measured:
 
     Attributes
     ----------
+    source
+        The prepared input, reduced if it is dense.
     options
         The options, with the embedding chosen.
     frame
@@ -64,6 +67,7 @@ class Measured:
         What a user should know, one sentence each.
     """
 
+    source: PreparedInput
     options: RemeshOptions
     frame: Frame
     surface: Surface
@@ -89,16 +93,16 @@ def count_for_length(source: PreparedInput, options: RemeshOptions, run: Run) ->
         measured = measure(source, n, options, run)
         extent = MetricExtent.of(measured.working, measured.field)
         asked = length / unit_of_lengths(options, measured.frame)
-        before, n = n, max(MIN_VERTICES, extent.count(asked) + _more_on_outline(source, measured, asked))
+        before, n = n, max(MIN_VERTICES, extent.count(asked) + _more_on_outline(measured, asked))
         if abs(n - before) <= _COUNT_TOLERANCE * n:
             break
     return n
 
 
-def _more_on_outline(source: PreparedInput, measured: Measured, length: float) -> int:
+def _more_on_outline(measured: Measured, length: float) -> int:
     """Return how many vertices more the outline of a surface has than edges of a length in the metric take there."""
-    surface = source.prepared.surface
-    outline = surface.edges[source.outline]
+    surface = measured.source.prepared.surface
+    outline = surface.edges[measured.source.outline]
     if len(outline) == 0:
         return 0
     ends = measured.frame.to_unit(surface.points)[outline]
@@ -116,10 +120,11 @@ def unit_of_lengths(options: RemeshOptions, frame: Frame) -> float:
     return 1.0 if options.has_tensors or options.size_field is not None else frame.scale
 
 
-def measure(source: PreparedInput, n: int, options: RemeshOptions, run: Run) -> Measured:
-    """Return the surface and the metric for n vertices."""
-    prepared = source.prepared
+def measure(source: PreparedInput, n: int, options: RemeshOptions, run: Run, *, nearest: bool = False) -> Measured:
+    """Return the surface and the metric for n vertices; ``nearest`` if the distance counts more than the shape."""
     with run.stage("prepare"):
+        source = reduced(source, n, options, nearest=nearest)
+        prepared = source.prepared
         frame = unit_frame(prepared.surface.points)
         surface = prepared.surface.with_points(frame.to_unit(prepared.surface.points))
         options = with_embedding_chosen(options, surface)
@@ -127,7 +132,7 @@ def measure(source: PreparedInput, n: int, options: RemeshOptions, run: Run) -> 
         surface, tagged = _with_smooth_borders(surface, source, followed.edges, options.feature_angle)
         creases = sharp_edges(surface, min(options.feature_angle, WEAK_ANGLE))
         creases |= source.fixed[surface.edges].any(axis=1)  # so that the points stay
-        metric = metric_source(options, surface, _prescribed(source, surface, frame, options))
+        metric = metric_source(options, surface, _prescribed(source, surface, frame, options), source.rings)
         spacings = partial(_spacings, metric, n) if prescribes_sizes(options) else None
         split = working_surface(surface, n, creases=creases, tagged=tagged, spacings=spacings)
         tips = split.on_coarse(source.fixed)
@@ -147,6 +152,7 @@ def measure(source: PreparedInput, n: int, options: RemeshOptions, run: Run) -> 
             surface = split.coarse.with_points(points[: split.coarse.n_points])
         limited = limit_to_patches(field, working, n)
     return Measured(
+        source=source,
         options=options,
         frame=frame,
         surface=surface,
@@ -162,13 +168,13 @@ def measure(source: PreparedInput, n: int, options: RemeshOptions, run: Run) -> 
     )
 
 
-def coarser(measured: Measured, source: PreparedInput, n: int) -> Measured | None:
+def coarser(measured: Measured, n: int) -> Measured | None:
     """Return a measured surface for a smaller number of vertices; None if other lines are followed with so few.
 
     The working surface stays: it resolves the sites of fewer vertices all the more.
     """
-    surface = source.prepared.surface
-    followed = source.features_at(n, surface.with_points(measured.frame.to_unit(surface.points)))
+    surface = measured.source.prepared.surface
+    followed = measured.source.features_at(n, surface.with_points(measured.frame.to_unit(surface.points)))
     if not np.array_equal(followed.edges, measured.followed_edges):
         return None
     limited = limit_to_patches(measured.unlimited, measured.working, n)

@@ -95,10 +95,10 @@ def set_up(
         A mesh of the same surface with more vertices, whose working surface and metric are taken, and its embedding
         where it does not depend on the number of vertices. None to compute all.
     """
-    measured = None if finer is None else coarser(finer.tasks.measured, source, n)
+    measured = None if finer is None else coarser(finer.tasks.measured, n)
     finer = None if measured is None else finer
-    measured = measure(source, n, options, run) if measured is None else measured
-    options, surface, split = measured.options, measured.surface, measured.split
+    measured = measure(source, n, options, run, nearest=nearest) if measured is None else measured
+    source, options, surface, split = measured.source, measured.options, measured.surface, measured.split
     working, field = measured.working, measured.field
     with run.stage("embed"):
         apart = separate_thin_walls(field, working, n, options.feature_angle) if follows_creases(options) else field

@@ -75,24 +75,25 @@ class Hybrid(Neural):
 
     Parameters
     ----------
-    crease_angle
+    crease_angle, radius
         As for :class:`~anisomesh.metric.sources.Curvature`; the other parameters are the same as for :class:`Neural`.
     """
 
     crease_angle: float = 40.0
+    radius: int = DEFAULT_RADIUS
 
     def __call__(self, surface: Surface) -> MetricField:
         """Return the metric at the points of a surface; errors as :class:`Neural`."""
         field = super().__call__(surface)
         denoised = surface if field.points is None else surface.with_points(field.points)
-        blended = _blended(denoised, field.tensors, self.crease_angle)
+        blended = _blended(denoised, field.tensors, self.crease_angle, self.radius)
         return replace(blended, points=field.points, noise=field.noise, remarks=field.remarks)
 
 
-def _blended(surface: Surface, predicted: PointTensors, crease_angle: float) -> MetricField:
+def _blended(surface: Surface, predicted: PointTensors, crease_angle: float, radius: int) -> MetricField:
     """Return the weighted mean, as line fields, of a predicted metric (V, 3, 3) and the measured one."""
-    patches = smooth_patches(surface, crease_angle, DEFAULT_RADIUS)
-    curvature = principal_curvatures(patches.surface, radius=DEFAULT_RADIUS)
+    patches = smooth_patches(surface, crease_angle, radius)
+    curvature = principal_curvatures(patches.surface, radius=radius)
     measured = curvature_metric(patches.surface, curvature)
     frames = tangent_frames(unit_normals(patches.surface))
     own, other = (
