@@ -20,10 +20,10 @@ from scipy.spatial import cKDTree
 import anisomesh
 from anisomesh.evaluation.preservation import feature_preservation
 from anisomesh.features.detect import corners, sharp_edges
-from anisomesh.mesh.subdivision import split_long_edges
 from anisomesh.mesh.surface import Surface
 from anisomesh.options import EMBEDDINGS, RemeshOptions
 from anisomesh.shapes.parts import sparse_parts
+from anisomesh.working.subdivision import split_long_edges
 
 CREASE_ANGLE = RemeshOptions().feature_angle
 CREASE_TOLERANCE = 0.1  # mean edges of the result: a crease is covered this close to a bent edge; heuristic

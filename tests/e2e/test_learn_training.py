@@ -44,7 +44,7 @@ from anisomesh.learn.training.tasks import EmbeddingTask, StretchTask, task_of  
 from anisomesh.learn.training.train import train  # noqa: E402
 from anisomesh.learn.weights_file import WeightsError  # noqa: E402
 from anisomesh.mesh.geometry import unit_frame  # noqa: E402
-from anisomesh.mesh.working_surface import working_surface  # noqa: E402
+from anisomesh.working.surface import working_surface  # noqa: E402
 from conftest import CLI  # noqa: E402
 
 PAPER = PaperOptions(channels=8, levels=2)

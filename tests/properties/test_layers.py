@@ -6,9 +6,9 @@ from scipy.spatial import cKDTree
 
 import anisomesh
 from anisomesh.embedding.direct import Start, embed
-from anisomesh.mesh.subdivision import split_long_edges
 from anisomesh.mesh.surface import Surface
 from anisomesh.shapes.analytic import open_patch
+from anisomesh.working.subdivision import split_long_edges
 
 SMALLEST, LARGEST = 0.002, 0.2
 

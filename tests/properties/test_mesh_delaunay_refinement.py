@@ -9,12 +9,12 @@ from sliver_shapes import comb, needle_tube
 from anisomesh.errors import OptionError
 from anisomesh.mesh import topology
 from anisomesh.mesh.closest_points import ClosestPoints
-from anisomesh.mesh.delaunay_refinement import refine_slivers
 from anisomesh.mesh.geometry import corner_angles, thickness
-from anisomesh.mesh.marked_surface import MarkedSurface
 from anisomesh.mesh.surface import Surface
-from anisomesh.mesh.working_surface import working_surface
 from anisomesh.shapes import analytic as shapes
+from anisomesh.working.delaunay_refinement import refine_slivers
+from anisomesh.working.marked_surface import MarkedSurface
+from anisomesh.working.surface import working_surface
 from conftest import examples
 
 ASPECT = 4.0

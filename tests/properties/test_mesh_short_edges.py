@@ -9,12 +9,12 @@ from sliver_shapes import comb, needle_tube, thick_comb
 from anisomesh._kernels.vectors import square_to_triangle
 from anisomesh.features.detect import sharp_edges
 from anisomesh.mesh.closest_points import ClosestPoints
-from anisomesh.mesh.marked_surface import MarkedSurface
-from anisomesh.mesh.short_edges import collapse_short_edges
 from anisomesh.mesh.surface import Surface
 from anisomesh.mesh.validity import check_validity
-from anisomesh.mesh.working_surface import working_surface
 from anisomesh.shapes import analytic as shapes
+from anisomesh.working.marked_surface import MarkedSurface
+from anisomesh.working.short_edges import collapse_short_edges
+from anisomesh.working.surface import working_surface
 from conftest import examples
 
 

@@ -7,9 +7,9 @@ from hypothesis import strategies as st
 
 from anisomesh.errors import OptionError
 from anisomesh.mesh import topology
-from anisomesh.mesh.subdivision import edges_within, split_long_edges
 from anisomesh.mesh.surface import Surface
 from anisomesh.shapes import analytic as shapes
+from anisomesh.working.subdivision import edges_within, split_long_edges
 from conftest import examples
 
 CLOSED = {

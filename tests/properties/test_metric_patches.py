@@ -14,7 +14,6 @@ from anisomesh.mesh.closest_points import ClosestPoints
 from anisomesh.mesh.geometry import unit_frame
 from anisomesh.mesh.surface import Surface
 from anisomesh.mesh.topology import connected_components
-from anisomesh.mesh.working_surface import working_surface
 from anisomesh.metric.field import checked_field
 from anisomesh.metric.narrow_patches import _extent, limit_to_patches
 from anisomesh.metric.patches import cut_along, smooth_patches
@@ -23,6 +22,7 @@ from anisomesh.metric.tensors import compute_metric
 from anisomesh.metric.transfer import PlacedMetric, transfer_to_corners
 from anisomesh.shapes.analytic import box, cylinder, sphere, torus
 from anisomesh.shapes.cad_part import cad_part
+from anisomesh.working.surface import working_surface
 
 
 def at_unit_size(surface):

@@ -10,13 +10,13 @@ from anisomesh.features.detect import sharp_edges
 from anisomesh.mesh.closest_points import ClosestPoints
 from anisomesh.mesh.geometry import even_edge_length, unit_frame
 from anisomesh.mesh.surface import Surface
-from anisomesh.mesh.working_surface import working_surface
 from anisomesh.metric.field import MetricField
 from anisomesh.metric.sources import Curvature
 from anisomesh.metric.thin_walls import separate_thin_walls
 from anisomesh.shapes.analytic import box, cylinder, sphere
 from anisomesh.shapes.parts import prism
 from anisomesh.shapes.patches import grid_faces
+from anisomesh.working.surface import working_surface
 
 ANGLE = 40.0  # degrees, of creases
 

@@ -9,10 +9,10 @@ from anisomesh.embedding.gradient import face_frames, face_gradient, face_tensor
 from anisomesh.errors import OptionError
 from anisomesh.mesh.geometry import unit_frame
 from anisomesh.mesh.surface import Surface
-from anisomesh.mesh.working_surface import working_surface
 from anisomesh.metric.sources import Curvature
 from anisomesh.metric.tensors import compute_metric, uniform_metric
 from anisomesh.shapes.analytic import box, cylinder, open_patch, sphere, torus
+from anisomesh.working.surface import working_surface
 
 
 def circular_metric(surface, stretch):

@@ -8,9 +8,9 @@ from anisomesh.evaluation.shape import quality_in_reference_metric, shape_statis
 from anisomesh.features.detect import sharp_edges
 from anisomesh.mesh.geometry import unit_frame
 from anisomesh.mesh.surface import Surface
-from anisomesh.mesh.working_surface import working_surface
 from anisomesh.metric.quality import anisotropic_quality
 from anisomesh.shapes.analytic import sphere
+from anisomesh.working.surface import working_surface
 
 
 def test_a_right_triangle():

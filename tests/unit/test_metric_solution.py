@@ -6,13 +6,13 @@ import pytest
 from anisomesh.conformance import check_metric_source
 from anisomesh.errors import MetricError, OptionError
 from anisomesh.io.meshes import mesh_of
-from anisomesh.mesh.subdivision import split_long_edges
 from anisomesh.mesh.surface import Surface
 from anisomesh.metric.solution.hessian import recovered_hessians
 from anisomesh.metric.solution.source import SolutionMetric, optimal_metric
 from anisomesh.options import RemeshOptions
 from anisomesh.setup.inputs import prepared_input
 from anisomesh.shapes.analytic import cylinder, open_patch, sphere
+from anisomesh.working.subdivision import split_long_edges
 
 QUADRATIC = np.array([[3.0, 1.0], [1.0, -2.0]])
 

@@ -12,8 +12,9 @@ from typing import Annotated
 
 import typer
 
-from anisomesh.cli import batch, benchmark, dataset, demo, evaluate, info, train
+from anisomesh.cli import batch, benchmark, dataset, demo, evaluate, train
 from anisomesh.cli.figures import group as figure
+from anisomesh.cli.info.command import command as info_command
 from anisomesh.cli.log import logs
 from anisomesh.cli.ratios import RatiosCommand
 from anisomesh.cli.remeshing.command import command as remesh_command
@@ -32,7 +33,7 @@ app = typer.Typer(
 app.command("remesh", cls=RatiosCommand)(logs(remesh_command))
 app.command("evaluate")(logs(evaluate.command))
 app.add_typer(figure.app, name="figure")
-app.command("info")(logs(info.command))
+app.command("info")(logs(info_command))
 app.command("demo")(logs(demo.command))
 app.command("batch", cls=RatiosCommand)(logs(batch.command))
 app.command("benchmark")(logs(benchmark.command))

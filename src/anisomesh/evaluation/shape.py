@@ -12,11 +12,11 @@ from anisomesh.features.detect import WEAK_ANGLE, sharp_edges
 from anisomesh.mesh.closest_points import ClosestPoints
 from anisomesh.mesh.geometry import corner_angles
 from anisomesh.mesh.surface import Surface
-from anisomesh.mesh.working_surface import working_surface
 from anisomesh.metric.field import MetricField
 from anisomesh.metric.quality import anisotropic_quality
 from anisomesh.metric.sources import Curvature
 from anisomesh.metric.transfer import transfer_to_corners
+from anisomesh.working.surface import working_surface
 
 _MIN_QUALITY = 0.7  # of the triangles of a reference, below which they are slivers; heuristic
 _EVEN_VERTICES = 5_000  # of the even mesh with which they are replaced

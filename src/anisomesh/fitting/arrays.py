@@ -12,8 +12,8 @@ from anisomesh._kernels import fit_arrays
 from anisomesh.features.detect import sharp_edges
 from anisomesh.fitting.samples import SurfaceSamples
 from anisomesh.mesh.closest_points import ClosestPoints
-from anisomesh.mesh.marked_surface import MarkedSurface
 from anisomesh.mesh.surface import Surface
+from anisomesh.working.marked_surface import MarkedSurface
 
 _FACE_ROOM, _SAMPLE_ROOM = 1_024, 65_536  # around a point; points with more stay
 

@@ -12,11 +12,11 @@ from anisomesh._kernels.heap import EdgeHeap
 from anisomesh._kernels.stars import Stars
 from anisomesh.execution.deadline import NO_DEADLINE, Deadline
 from anisomesh.mesh.closest_points import ClosestPoints
-from anisomesh.mesh.marked_surface import MarkedSurface
 from anisomesh.mesh.surface import Surface
 from anisomesh.mesh.topology import edge_keys
 from anisomesh.mesh.validity import inverted_faces
 from anisomesh.meshops.held import points_near_faces
+from anisomesh.working.marked_surface import MarkedSurface
 
 _STAR_ROOM = 4_096  # faces around a point; a point with more, as in the middle of a fan, stays
 _MAX_REPEATS = 4  # with points held where triangles were inverted

@@ -9,9 +9,9 @@ import numpy as np
 from anisomesh._arrays import EdgeLabels, PointLabels, PointMask
 from anisomesh._kernels.decimate import Decimation, ShapeLimits, set_quadrics
 from anisomesh._kernels.reduce import collapse_cheap_edges, costs_of_edges
-from anisomesh.mesh.marked_surface import MarkedSurface
 from anisomesh.mesh.surface import Surface
 from anisomesh.meshops.decimation import decimation_arrays
+from anisomesh.working.marked_surface import MarkedSurface
 
 _SAMPLED_FACES = 20_000  # whose edges say how large costs are
 _FIRST_SHARE = 0.2  # of the edges that the first pass may collapse; heuristic

@@ -19,7 +19,6 @@ from anisomesh.features.smooth_lines import with_smooth_lines
 from anisomesh.mesh.closest_points import ClosestPoints
 from anisomesh.mesh.geometry import Frame, unit_frame
 from anisomesh.mesh.surface import Surface
-from anisomesh.mesh.working_surface import WorkingSurface, working_surface
 from anisomesh.metric.conformity import MetricExtent
 from anisomesh.metric.field import MetricField, MetricSource, checked_field
 from anisomesh.metric.narrow_patches import limit_to_patches
@@ -29,6 +28,7 @@ from anisomesh.options import MIN_VERTICES, RemeshOptions
 from anisomesh.resolve import follows_creases, is_designed, metric_source, prescribes_sizes, with_embedding_chosen
 from anisomesh.setup.inputs import PreparedInput
 from anisomesh.setup.reduction import reduced
+from anisomesh.working.surface import WorkingSurface, working_surface
 
 logger = logging.getLogger(__name__)
 

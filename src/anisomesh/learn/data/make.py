@@ -21,13 +21,13 @@ from anisomesh.learn.data.retriangulate import with_random_triangles
 from anisomesh.mesh.closest_points import ClosestPoints
 from anisomesh.mesh.geometry import thickness, unit_frame
 from anisomesh.mesh.surface import Surface
-from anisomesh.mesh.working_surface import working_surface
 from anisomesh.meshops.decimation import decimate
 from anisomesh.metric.curvature import PrincipalCurvatures, principal_curvatures
 from anisomesh.metric.tensors import curvature_metric, metric_root
 from anisomesh.metric.transfer import transfer_metric_roots
 from anisomesh.repair.prepare import prepare
 from anisomesh.shapes.implicit import Blobs
+from anisomesh.working.surface import working_surface
 
 # Shares and limits below are heuristic, chosen on training meshes.
 _EQUILATERAL_THICKNESS = 0.4330127  # sqrt(3) / 4, area over squared longest side

@@ -13,12 +13,12 @@ import numpy as np
 import numpy.typing as npt
 
 from anisomesh._arrays import EdgeMask, Floats, PointLabels, PointMask
-from anisomesh.mesh.delaunay_refinement import Refinement, refine_slivers
 from anisomesh.mesh.geometry import even_edge_length
-from anisomesh.mesh.marked_surface import MarkedSurface
-from anisomesh.mesh.short_edges import collapse_short_edges
-from anisomesh.mesh.subdivision import Subdivision, edges_within, split_long_edges
 from anisomesh.mesh.surface import Surface
+from anisomesh.working.delaunay_refinement import Refinement, refine_slivers
+from anisomesh.working.marked_surface import MarkedSurface
+from anisomesh.working.short_edges import collapse_short_edges
+from anisomesh.working.subdivision import Subdivision, edges_within, split_long_edges
 
 _MAX_EDGE_PER_SITE_DISTANCE = 1.6  # longest edge over the distance between evenly spread sites; heuristic
 _METRIC_VERTICES = 5_000  # vertices of an even mesh that resolves the metric; the learned one is trained on such meshes

@@ -9,8 +9,8 @@ import numpy as np
 from anisomesh._arrays import PointLabels
 from anisomesh._kernels import collapse as kernels
 from anisomesh._kernels.stars import Stars
-from anisomesh.mesh.marked_surface import MarkedSurface
 from anisomesh.mesh.surface import Surface
+from anisomesh.working.marked_surface import MarkedSurface
 
 _SLIVER_FACTOR = 3.0  # of the length of edges that are collapsed, in slivers; heuristic
 _SHARES = 0.5 ** np.arange(6, -1, -1)  # of the largest lengths, pass by pass: short edges first

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from anisomesh.cli.arguments import InputFormat
-from anisomesh.cli.contents import contents, contents_rows
+from anisomesh.cli.info.contents import contents, contents_rows
 from anisomesh.cli.job import check_input_format, read_mesh
 from anisomesh.cli.report import as_json, counted, describe_validity, hints, table
 

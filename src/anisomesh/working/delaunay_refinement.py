@@ -10,8 +10,8 @@ import numpy.typing as npt
 from anisomesh._kernels import refinement as kernels
 from anisomesh.errors import OptionError
 from anisomesh.mesh.geometry import thickness
-from anisomesh.mesh.marked_surface import MarkedSurface
 from anisomesh.mesh.surface import Surface
+from anisomesh.working.marked_surface import MarkedSurface
 
 _SHRINK = 0.5**0.5  # of the lengths of the sides split, from pass to pass: long ones first, so that sizes are graded
 

@@ -1,0 +1,1 @@
+"""The command info: what a mesh file has."""
