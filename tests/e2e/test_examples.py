@@ -56,6 +56,7 @@ def test_every_example_is_tested():
         "carry_data",
         "adapt_to_a_solution",
         "levels_of_detail",
+        "large_input",
     }
     tutorials = {"own_metric_source", "own_energy", "own_embedder", "stages", "learn_a_metric"}
     assert {path.stem for path in FOLDER.glob("*.py")} == tested | tutorials
@@ -109,6 +110,14 @@ def test_noisy_scan_is_better_with_the_network(tmp_path, capsys, monkeypatch):
     )
     assert hybrid[0] >= direct[0]  # G, to two digits: the fit makes good triangles of noise too
     assert hybrid[1] < 0.6 * direct[1]  # RMS
+
+
+@pytest.mark.slow
+def test_a_large_input_is_reduced_without_a_larger_error(capsys):
+    reduced, whole = example("large_input").main(n_along=600, n_around=52, n_vertices=300)
+    assert reduced.working.n_points < 0.8 * whole.working.n_points
+    errors = [float(line.split()[-1].removesuffix("e-4")) for line in capsys.readouterr().out.splitlines()]
+    assert errors[0] < 1.1 * errors[1]
 
 
 @pytest.mark.slow

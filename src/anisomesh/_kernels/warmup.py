@@ -5,6 +5,7 @@ from __future__ import annotations
 from pathlib import Path
 
 from anisomesh._kernels import (
+    connectivity,
     decimate,
     diagram,
     fit_moves,
@@ -23,6 +24,9 @@ from anisomesh._kernels import (
 )
 
 _REMESH = (
+    connectivity.sort_sides,
+    connectivity.number_edges,
+    connectivity.has_single_fans,
     integrate.integrate_chunk,
     integrate.gather,
     diagram.count_chunk,

@@ -138,7 +138,8 @@ def prepare(surface: Surface, *, weld_tolerance: float | Literal["auto"] = 0.0) 
     component by the larger part of its area, cutting edges where that is impossible; glue faces at edges with two
     faces, and at other edges the pairs that bound the same wedge of the solid, so that two cubes sharing an edge become
     two closed cubes; give each fan of faces its own point. Passes are repeated until nothing changes, so that a second
-    call of this function changes nothing. Sorting dominates the cost, O((V + F) log(V + F)).
+    call of this function changes nothing. A clean surface is checked in linear time but for a sort of its points; in
+    repairs sorting dominates, O((V + F) log(V + F)).
     """
     _check_range(surface)
     tolerance = weld_distance(surface, weld_tolerance)
