@@ -12,6 +12,7 @@ from anisomesh.io.polygons import PolygonSoup, triangulate
 from anisomesh.learn.inference.predict import predict
 from anisomesh.mesh.closest_points import ClosestPoints
 from anisomesh.meshops.decimation import decimate
+from anisomesh.meshops.reduction import reduce_points
 from anisomesh.metric.field import MetricField
 from anisomesh.metric.transfer import PlacedMetric
 from anisomesh.shapes.analytic import box, sphere
@@ -31,6 +32,7 @@ def second():
     anisomesh.evaluate(ball, ball, samples=100)
     predict(ball.with_points(ball.points / ball.diagonal))
     coarse = decimate(ball, 100).surface
+    reduce_points(ball, 100, held=np.zeros(ball.n_points, dtype=bool), labels=np.zeros(len(ball.edges), dtype=np.int32))
     identity = PlacedMetric(ClosestPoints(ball), MetricField(tensors=np.tile(np.eye(3), (ball.n_points, 1, 1))))
     none = np.zeros(len(ball.edges), dtype=bool)
     samples = sample_surface(ball, 2_000, creases=none, metric=identity, rng=np.random.default_rng(0))
