@@ -1,9 +1,9 @@
 """Time, memory and error of a remesh of a large input to few vertices, with and without its reduction.
 
 Usage: python benchmarks/large_inputs.py [--faces 1450000] [--vertices 5000] [--mesh FILE] [--whole]
-Run it on an idle machine. The input is a knotted tube with waves of two lengths on it, made by code, or a file. Each remesh
-is a process of its own, kernels compiled. With --whole the input is remeshed without a reduction too, which takes minutes,
-and the errors are compared.
+Run it on an idle machine. The input is a knotted tube with waves of two lengths on it, made by code, or a file. Each
+remesh is a process of its own, kernels compiled. With --whole the input is remeshed without a reduction too, which
+takes minutes, and the errors are compared.
 """
 
 from __future__ import annotations
