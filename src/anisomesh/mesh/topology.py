@@ -1,6 +1,7 @@
 """Connectivity of triangle lists (F, 3): edges, adjacency, fans, components and boundary loops.
 
 Side ``3 f + c`` of a mesh is the directed edge opposite corner ``c`` of face ``f``, from corner ``c + 1`` to ``c + 2``.
+Kernels are imported where they are used, so that files are read without Numba.
 """
 
 from __future__ import annotations
@@ -11,7 +12,6 @@ from scipy import sparse
 from scipy.sparse import csgraph
 
 from anisomesh._arrays import EdgeIndices, Edges, FaceIndices, FaceLabels, Faces, Indices, PointMask
-from anisomesh._kernels import connectivity
 
 
 def half_edges(faces: Faces) -> npt.NDArray[np.int32]:
@@ -27,6 +27,8 @@ def edge_keys(ends: npt.NDArray[np.integer]) -> npt.NDArray[np.int64]:
 
 def edges_of(faces: Faces) -> tuple[Edges, FaceIndices]:
     """Return the unique edges (E, 2), lower index first, in order, and the edge opposite each corner (F, 3)."""
+    from anisomesh._kernels import connectivity
+
     faces = np.array(faces, dtype=np.int32)  # of one type and layout, for which the kernels are compiled
     n_points = int(faces.max()) + 1 if len(faces) else 0
     first = np.zeros(n_points + 1, dtype=np.int64)
@@ -41,6 +43,8 @@ def edges_of(faces: Faces) -> tuple[Edges, FaceIndices]:
 
 def edge_faces(face_edges: FaceIndices, n_edges: int) -> EdgeIndices:
     """Return the faces at each edge (E, 2): the second is -1 at a boundary edge, both are -1 at a non-manifold edge."""
+    from anisomesh._kernels import connectivity
+
     pairs = np.full((n_edges, 2), -1, dtype=np.int32)
     connectivity.edge_faces(face_edges, np.zeros(n_edges, dtype=np.int32), pairs)
     return pairs
@@ -48,6 +52,8 @@ def edge_faces(face_edges: FaceIndices, n_edges: int) -> EdgeIndices:
 
 def face_neighbours(face_edges: FaceIndices, edge_faces: EdgeIndices) -> FaceIndices:
     """Return the face across each side (F, 3); -1 at boundary and non-manifold edges."""
+    from anisomesh._kernels import connectivity
+
     across = np.empty_like(face_edges)
     connectivity.face_neighbours(face_edges, edge_faces, across)
     return across
@@ -124,6 +130,8 @@ def count_nonmanifold_points(faces: Faces) -> int:
 
 def is_oriented(faces: Faces) -> bool:
     """Return whether the faces are consistently oriented: each edge with two faces has one side in each direction."""
+    from anisomesh._kernels import connectivity
+
     edges, face_edges = edges_of(faces)
     counts = np.bincount(face_edges.ravel(), minlength=len(edges)).astype(np.int32)
     return bool(connectivity.is_oriented(faces, face_edges, counts, np.zeros(len(edges), dtype=np.int32)))
@@ -134,6 +142,8 @@ def has_single_fans(faces: Faces, neighbours: FaceIndices) -> bool:
 
     ``neighbours`` are the faces across the sides (F, 3), as :func:`face_neighbours` returns them.
     """
+    from anisomesh._kernels import connectivity
+
     n_faces = np.zeros(int(faces.max()) + 1, dtype=np.int32)
     return bool(connectivity.has_single_fans(faces, neighbours, n_faces))
 
