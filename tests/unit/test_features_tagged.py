@@ -5,7 +5,7 @@ import pytest
 
 from anisomesh.errors import MeshFileError, OptionError
 from anisomesh.features.tagged import distance_to_crease_edges, tagged_edges
-from anisomesh.io.text_tables import load_pairs
+from anisomesh.io.text_tables import load_pairs, load_points
 from anisomesh.mesh.surface import Surface
 from anisomesh.repair.prepare import prepare
 from anisomesh.shapes.analytic import open_patch
@@ -97,7 +97,7 @@ def test_the_boundary_of_a_mesh_follows_tagged_edges_on_the_boundary():
     assert distance_to_crease_edges(surface, on_boundary, coarse, none) < 1e-12
     shifted = coarse.with_points(coarse.points + np.array([0.0, 0.0, 0.25]))
     assert distance_to_crease_edges(surface, on_boundary, shifted, none) == pytest.approx(0.25)
-    assert distance_to_crease_edges(surface, np.ones_like(on_boundary), coarse, none) == np.inf
+    assert distance_to_crease_edges(surface, np.ones_like(on_boundary), shifted, none) == np.inf
 
 
 def test_distance_to_crease_edges_is_the_largest_one():
@@ -106,7 +106,30 @@ def test_distance_to_crease_edges_is_the_largest_one():
     none = np.zeros((0, 2), dtype=np.int64)
     both = np.concatenate([row(coarse), row(coarse, 0.5)]).astype(np.int64)
     assert distance_to_crease_edges(surface, tagged, coarse, both) < 1e-12
-    assert distance_to_crease_edges(surface, tagged, coarse, both[:4]) == pytest.approx(0.5)
-    assert distance_to_crease_edges(surface, tagged, coarse, both[1:]) == pytest.approx(0.5)
-    assert distance_to_crease_edges(surface, tagged, coarse, none) == np.inf
+    lifted = coarse.with_points(coarse.points + np.array([0.0, 0.0, 1e-3]))  # no edge lies on a line
+    assert distance_to_crease_edges(surface, tagged, lifted, both) == pytest.approx(1e-3)
+    assert distance_to_crease_edges(surface, tagged, lifted, both[:4]) == pytest.approx(0.5, abs=1e-5)
+    assert distance_to_crease_edges(surface, tagged, lifted, both[1:]) == pytest.approx(0.5, abs=1e-5)
+    assert distance_to_crease_edges(surface, tagged, lifted, none) == np.inf
     assert distance_to_crease_edges(surface, np.zeros_like(tagged), coarse, none) == 0.0
+
+
+def test_edges_on_tagged_lines_count_even_if_none_is_known_to_be_on_a_crease():
+    """A mesh that is the input, or one of a flat grid, was said to follow none of them."""
+    surface = open_patch(lambda x, y: 0.0 * x, n=6)
+    inside = surface.edge_face_count == 2
+    level = surface.points[surface.edges][:, :, 1]
+    tagged = inside & (np.ptp(level, axis=1) < 1e-12) & (np.abs(level[:, 0] - np.median(surface.points[:, 1])) < 1e-12)
+    assert tagged.any()
+    none = np.zeros((0, 2), dtype=np.int64)
+    assert distance_to_crease_edges(surface, tagged, surface, none) < 1e-12
+    across = surface.with_points(surface.points[:, [1, 0, 2]])  # the same square, with the other diagonals
+    assert distance_to_crease_edges(surface, tagged, across, none) < 1e-12
+    coarse = Surface(np.array([[-1.0, -1, 0], [1, -1, 0], [1, 1, 0], [-1, 1, 0]]), np.array([[0, 1, 2], [0, 2, 3]]))
+    assert np.isinf(distance_to_crease_edges(surface, tagged, coarse, none))
+
+
+def test_a_file_of_points_may_begin_with_a_byte_order_mark(tmp_path):
+    file = tmp_path / "points.txt"
+    file.write_bytes(b"\xef\xbb\xbf0\r\n7\r\n")
+    assert load_points(file).tolist() == [0, 7]

@@ -9,13 +9,14 @@ import numpy as np
 import numpy.typing as npt
 from scipy.spatial import cKDTree
 
-from anisomesh._arrays import EdgeMask
+from anisomesh._arrays import EdgeEnds, EdgeMask, Floats, Points
 from anisomesh.errors import OptionError
 from anisomesh.mesh.surface import Surface
 from anisomesh.mesh.topology import edge_keys
 from anisomesh.repair.near_points import weld_distance
 from anisomesh.repair.t_junctions import ON_SIDE
 
+_MAX_SAGITTA = 0.1  # distance of the middle of an edge along a line from it, over the length of the edge; heuristic
 _MIN_SEARCH_RADIUS = 1e-12  # times the diagonal of the input: rounding of copied points
 
 
@@ -134,11 +135,31 @@ def distance_to_crease_edges(
     mesh
         A mesh near the surface, in the same units.
     crease_edges
-        Ends of the edges of the mesh along creases inside it (n, 2); infinite if there are none for edges inside.
+        Ends of the edges of the mesh that are known to be along creases inside it (n, 2). Others that lie on tagged
+        edges count too, as of a mesh that is the input; infinite if there are none of both for edges inside.
     """
     boundary, outline = surface.edge_face_count == 1, mesh.edges[mesh.edge_face_count == 1]
-    lines = ((tagged & ~boundary, crease_edges), (tagged & boundary, outline))
+    inside = tagged & ~boundary
+    if inside.any():
+        crease_edges = np.concatenate([crease_edges, _edges_on(surface, inside, mesh)])
+    lines = ((inside, crease_edges), (tagged & boundary, outline))
     return max(_largest_distance(surface.points[surface.edges[of]], mesh, edges) for of, edges in lines)
+
+
+def _edges_on(surface: Surface, tagged: EdgeMask, mesh: Surface) -> EdgeEnds:
+    """Return the edges of a mesh (n, 2) with both ends on tagged edges (E,) of a surface, and the middle near them."""
+
+    def distance(places: Points) -> Floats:
+        squares, _, _ = igl.point_mesh_squared_distance(places, surface.points, surface.edges[tagged].astype(np.int64))
+        return np.asarray(np.sqrt(squares))
+
+    on_line = distance(mesh.points) <= ON_SIDE * surface.diagonal
+    found = on_line[mesh.edges].all(axis=1)
+    edges: EdgeEnds = mesh.edges[found].astype(np.int64)
+    if len(edges) == 0:
+        return edges
+    is_along = distance(mesh.points[edges].mean(axis=1)) <= _MAX_SAGITTA * mesh.edge_lengths[found]
+    return np.asarray(edges[is_along])
 
 
 def _largest_distance(ends: npt.NDArray[np.float64], mesh: Surface, edges: npt.NDArray[np.integer]) -> float:

@@ -67,7 +67,7 @@ def _vertex_numbers(path: str | os.PathLike[str], width: int, expected: str) -> 
 def _lines(path: str | os.PathLike[str], expected: str) -> Iterator[tuple[str, list[str]]]:
     """Yield where each line is that is not empty, for messages, and its words."""
     try:
-        text = Path(path).read_text(encoding="utf-8")
+        text = Path(path).read_text(encoding="utf-8-sig")  # with or without a byte order mark
     except OSError as error:
         raise MeshFileError(f"{path}: {why_unreadable(path, error)}; expected a text file, {expected}") from error
     except UnicodeDecodeError as error:

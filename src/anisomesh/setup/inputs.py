@@ -151,7 +151,11 @@ class PreparedInput:
             if not edges.any():
                 continue
             if needed > _MAX_BORDER_SHARE * n_vertices:
-                remarks.append(f"edges do not follow all {what}, which would take about {needed:,.0f} vertices")
+                most = f"{_MAX_BORDER_SHARE:.0%} of {n_vertices:,} vertices"
+                remarks.append(
+                    f"edges do not follow all {what} where these are smooth: that would take about {needed:,.0f}, more "
+                    f"than {most}"
+                )
             else:
                 followed |= edges
                 kinds.append(what)
