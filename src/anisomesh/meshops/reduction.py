@@ -17,7 +17,7 @@ _SAMPLED_FACES = 20_000  # whose edges say how large costs are
 _SHARE = 0.5  # of the edges that the first pass may collapse; heuristic
 _GROWTH, _LAST_GROWTH = 2.0, 1.25  # of the largest cost from pass to pass, and with few points left to go; heuristic
 _LAST_FACTOR = 2.0  # points left over points wanted, up to which these are few; heuristic
-_MAX_PASSES = 100  # less than twenty are enough from a hundred times as many points
+_MOST_PASSES = 100  # less than twenty are enough from a hundred times as many points
 _FINE_LIMITS = ShapeLimits(cosine=0.7, thickness=0.05)  # for triangles that are small, and are to be even; heuristic
 _MAX_IDLE_PASSES = 8  # without a collapse, one after the other: then the ones that are left are not allowed; heuristic
 
@@ -80,7 +80,7 @@ def reduce_points(surface: Surface, n_points: int, *, held: PointMask, labels: E
     set_quadrics(state)
     left, limit = surface.n_points, _quantile_of_costs(state, _SHARE)
     idle = 0
-    for number in range(1, _MAX_PASSES + 1):
+    for number in range(1, _MOST_PASSES + 1):
         count = collapse_cheap_edges(state, limit, number)
         left, idle = left - count, 0 if count else idle + 1
         if left <= n_points or idle == _MAX_IDLE_PASSES:
