@@ -20,15 +20,15 @@ def costs_of_edges(state, step, costs):
 
 
 @kernel
-def collapse_cheap_edges(state, limit, now):
+def collapse_cheap_edges(state, limit, most, now):
     """Collapse edges that cost up to a limit, none at a point where one was in this pass, and return their number.
 
-    ``now`` is the number of the pass, from 1 on.
+    There are at most ``most``; ``now`` is the number of the pass, from 1 on.
     """
     mesh, changed, count = state.mesh, state.changed, 0
     for face in range(len(mesh.faces)):
         for side in range(3):
-            if mesh.faces[face, 0] < 0:
+            if mesh.faces[face, 0] < 0 or count == most:
                 break
             if face < mesh.neighbours[face, side]:
                 continue

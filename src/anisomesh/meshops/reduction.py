@@ -14,7 +14,7 @@ from anisomesh.meshops.decimation import decimation_arrays
 from anisomesh.working.marked_surface import MarkedSurface
 
 _SAMPLED_FACES = 20_000  # whose edges say how large costs are
-_SHARE = 0.5  # of the edges that the first pass may collapse; heuristic
+_SHARE = 0.5  # of the points that are to go, as a share of the edges that the first pass may collapse; heuristic
 _GROWTH, _LAST_GROWTH = 2.0, 1.25  # of the largest cost from pass to pass, and with few points left to go; heuristic
 _LAST_FACTOR = 2.0  # points left over points wanted, up to which these are few; heuristic
 _MOST_PASSES = 100  # less than twenty are enough from a hundred times as many points
@@ -42,14 +42,14 @@ class Reduced:
 
 
 def reduce_points(surface: Surface, n_points: int, *, held: PointMask, labels: EdgeLabels) -> Reduced:
-    """Collapse edges until about a number of points is left, or none can go.
+    """Collapse edges until a number of points is left, or none can go.
 
     Parameters
     ----------
     surface
         An oriented manifold surface.
     n_points
-        Number of points wanted; a few percent, rarely a quarter, of them are missing at the end.
+        Number of points wanted.
     held
         Points (V,) that stay.
     labels
@@ -78,12 +78,12 @@ def reduce_points(surface: Surface, n_points: int, *, held: PointMask, labels: E
     stays = held | _line_ends(surface, labels)
     state = decimation_arrays(surface, stays, labels, moves=False, limits=_FINE_LIMITS)
     set_quadrics(state)
-    left, limit = surface.n_points, _quantile_of_costs(state, _SHARE)
-    idle = 0
+    left, share = surface.n_points, _SHARE * (1.0 - n_points / surface.n_points)
+    limit, idle = _quantile_of_costs(state, share), 0
     for number in range(1, _MOST_PASSES + 1):
-        count = collapse_cheap_edges(state, limit, number)
+        count = collapse_cheap_edges(state, limit, left - n_points, number)
         left, idle = left - count, 0 if count else idle + 1
-        if left <= n_points or idle == _MAX_IDLE_PASSES:
+        if left == n_points or idle == _MAX_IDLE_PASSES:
             break
         limit *= _GROWTH if left > _LAST_FACTOR * n_points else _LAST_GROWTH
         if count == 0:
