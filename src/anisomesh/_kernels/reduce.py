@@ -6,7 +6,7 @@ from .decimate import collapse, place_between
 
 @kernel
 def costs_of_edges(state, step, costs):
-    """Set the costs of the edges of every so many faces, and return their number."""
+    """Set the costs of the edges of every ``step``-th face, and return their number."""
     mesh, count = state.mesh, 0
     for face in range(0, len(mesh.faces), step):
         if mesh.faces[face, 0] < 0:
