@@ -226,7 +226,7 @@ def _remesh(cut: Cut, n: int, options: RemeshOptions, run: Run, manner: Manner) 
     n_sites = n_rest if junctions is None else sites_for(junctions, n_rest)
     tasks = set_up(source, n_sites, options, run, nearest=manner.nearest, finer=manner.finer)
     measured, task, asked = tasks.measured, tasks.dual, manner.asked
-    frame, field = measured.frame, measured.field
+    source, frame, field = measured.source, measured.frame, measured.field
     if tasks.start is None:
         run.check_time()
     order = task.voronoi.embedded.face_order
@@ -237,9 +237,7 @@ def _remesh(cut: Cut, n: int, options: RemeshOptions, run: Run, manner: Manner) 
     mesh, optimised = made.mesh, made.optimised
     is_joined = cut.whole.junctions is not None and (junctions is None or made.joined)
     agreement = _agreement(mesh, tasks, asked) if asked or task.error_weights is not None else None
-    rest, reference = (
-        Surface(measured.source.to_model(each.points, frame), each.faces) for each in (mesh, measured.surface)
-    )
+    rest, reference = (Surface(source.to_model(each.points, frame), each.faces) for each in (mesh, measured.surface))
     surface, validity = cut.checked(rest, reference, made.validity, run.deadline)
     result = RemeshResult(
         surface=surface,

@@ -266,10 +266,9 @@ def _weld(surface: Surface, tolerance: float) -> PointLabels:
 
 def _is_clean(surface: Surface, labels: PointLabels, tolerance: float) -> bool:
     """Return whether no repair is needed; coincident points are accepted unless welding them would close a gap."""
-    faces = surface.faces
+    faces, across = surface.faces, surface.face_neighbours
     if not topology.used_points(faces, surface.n_points).all() or surface.edge_face_count.max() > 2:
         return False
-    across = surface.face_neighbours
     is_twin = (across[:, 0] == across[:, 1]) & (across[:, 0] >= 0)  # of its neighbour: they have the same three points
     return bool(
         topology.is_oriented(faces)
