@@ -70,7 +70,7 @@ def checked(jobs: Sequence[Job], folder: str) -> list[Job]:
     Raises
     ------
     OptionError
-        If there is no job, an option is unknown or out of range, an input or another file is missing, a format is
+        If the list is empty, an option is unknown or out of range, an input or another file is missing, a format is
         unknown, or two jobs write the same file, or one writes the input of any.
     """
     if not jobs:
