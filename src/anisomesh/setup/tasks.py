@@ -18,7 +18,6 @@ from anisomesh.embedding.embedder import checked_embedding
 from anisomesh.execution.run import Run
 from anisomesh.features.detect import sharp_edges
 from anisomesh.features.network import FeatureNetwork, trace_features
-from anisomesh.fitting.fit import FitPlan
 from anisomesh.fitting.target import FitTarget
 from anisomesh.mesh.embedded_surface import EmbeddedSurface
 from anisomesh.mesh.surface import Surface
@@ -128,15 +127,9 @@ def set_up(
             trees=trees,
         )
         start = None if finer is None else _start(finer, task, options)
-        plan = fit_plan(options, surface, nearest=nearest, warm=start is not None)
-        if plan is not None and source.junctions is not None:  # a decimation of sheets would not fit together
-            plan = replace(plan, decimation=None)
         sizing = PlacedMetric(trees.of(working), asked)
         metric = replace(sizing, field=field) if weights is None else sizing
-        prescribed = bool(source.tagged.any())
-        target = None
-        if plan is not None:
-            target = _fit_target(task, measured.tagged, metric, plan, options, prescribed=prescribed)
+        target = _fit_target(task, measured, metric, nearest=nearest, warm=start is not None)
     return Tasks(
         measured=measured,
         metric=metric,
@@ -182,28 +175,28 @@ def _given(field: MetricField) -> PointTensors | CornerTensors:
 
 
 def _fit_target(
-    task: MeshingTask,
-    tagged: EdgeMask,
-    metric: PlacedMetric,
-    plan: FitPlan,
-    options: RemeshOptions,
-    *,
-    prescribed: bool,
-) -> FitTarget:
-    """Return what meshes are fitted to, with ``tagged`` edges (E,) of the surface to mesh.
+    task: MeshingTask, measured: Measured, metric: PlacedMetric, *, nearest: bool, warm: bool
+) -> FitTarget | None:
+    """Return what meshes are fitted to, None if they are not.
 
-    If edges are ``prescribed`` by a user all creases are held, else only borders and seams.
+    If edges are prescribed by a user all creases are held, else only borders and seams.
     """
+    source, options = measured.source, measured.options
+    plan = fit_plan(options, measured.surface, nearest=nearest, warm=warm)
+    if plan is None:
+        return None
+    if source.junctions is not None:  # a decimation of sheets would not fit together
+        plan = replace(plan, decimation=None)
     target = FitTarget.of(
         task.reference,
         metric,
         task.n_vertices,
         corners=task.corner_places,
-        holds_creases=prescribed and bool(task.features.required.any()),
+        holds_creases=bool(source.tagged.any() and task.features.required.any()),
         crease_angle=options.feature_angle,
         plan=plan,
     )
-    return replace(target, lines=task.surface.edges[tagged].astype(np.int64), anchors=task.anchors)
+    return replace(target, lines=task.surface.edges[measured.tagged].astype(np.int64), anchors=task.anchors)
 
 
 def _features(
