@@ -7,7 +7,7 @@ import pytest
 from scipy.spatial.transform import Rotation
 
 from anisomesh import Mesh, MeshError, Regions, Surface, transfer_attributes
-from anisomesh.attributes.blend import blend_skin
+from anisomesh.attributes.blend import Blend, blend_skin
 from anisomesh.shapes.analytic import box, sphere
 
 RNG = np.random.default_rng(5)
@@ -187,23 +187,48 @@ def test_colours_of_bytes_are_interpolated_and_rounded():
     assert np.abs(result - 255.0 * (0.5 + 0.5 * target.points)).max() < 1.5
 
 
-def test_normals_and_tangents_keep_their_length_and_missing_values_stay_local():
+def test_normals_and_tangents_keep_their_length():
     source, target = sphere(2), turned(sphere(3))
     tangent = np.cross(source.points, [0.0, 0.0, 1.0]) + 1e-3
     tangent = np.concatenate(
         [tangent / np.linalg.norm(tangent, axis=1)[:, None], np.ones((source.n_points, 1))], axis=1
     )
-    holes = np.where(np.arange(source.n_points) == 7, np.nan, 1.0)
-    mesh = Mesh(
-        surface=source,
-        point_data={"Normals": source.points.astype(np.float32), "TANGENT": tangent, "measured": holes},
-    )
+    mesh = Mesh(surface=source, point_data={"Normals": source.points.astype(np.float32), "TANGENT": tangent})
     result = transfer_attributes(mesh, target).point_data
     np.testing.assert_allclose(np.linalg.norm(result["Normals"], axis=1), 1.0, atol=1e-6)
     np.testing.assert_allclose(np.linalg.norm(result["TANGENT"][:, :3], axis=1), 1.0, atol=1e-12)
     assert set(result["TANGENT"][:, 3]) == {1.0}
     assert result["Normals"].dtype == np.float32
-    assert 0 < np.isnan(result["measured"]).sum() < 0.05 * target.n_points
+
+
+@pytest.mark.parametrize("values", [[5.0, np.nan, 2.0], [np.nan, 3.0 + 2.0j, np.nan], [np.nan, np.inf, np.nan]])
+def test_a_value_between_missing_ones_is_the_mean_of_the_others(values):
+    """Regression: it was the value of the nearest corner, and missing wherever that one was."""
+    weights = np.concatenate([RNG.dirichlet(np.ones(3), 50), [[0.0, 0.5, 0.5], [1.0, 0.0, 0.0], [0.3, 0.0, 0.7]]])
+    values = np.array(values)
+    known = np.isfinite(values)
+    corners = np.repeat(values[None, :], len(weights), axis=0)
+    found = Blend("field", values).at(corners, weights, np.argmax(weights, axis=1))
+    shares = weights[:, known]
+    total = shares.sum(axis=1)
+    expected = (shares @ values[known])[total > 0.0] / total[total > 0.0]
+    np.testing.assert_allclose(found[total > 0.0], expected, rtol=1e-12)
+    assert not np.isfinite(found[total == 0.0]).any()
+
+
+def test_missing_values_and_directions_stay_local():
+    source, target = sphere(2), turned(sphere(3))
+    gone = source.points[:, 2] > 0.5
+    measured, normals = source.points[:, 0].copy(), source.points.astype(np.float32)
+    measured[gone], normals[gone] = np.nan, np.nan
+    mesh = Mesh(surface=source, point_data={"measured": measured, "Normals": normals})
+    result = transfer_attributes(mesh, target).point_data
+    missing = np.isnan(result["measured"])
+    assert missing.any()
+    assert not missing[target.points[:, 2] < 0.5].any()
+    assert np.abs(result["measured"] - target.points[:, 0])[~missing].max() < source.edge_lengths.max()
+    np.testing.assert_array_equal(np.isnan(result["Normals"]).any(axis=1), missing)
+    np.testing.assert_allclose(np.linalg.norm(result["Normals"][~missing], axis=1), 1.0, atol=1e-6)
 
 
 def test_weights_of_joints_are_the_interpolated_ones_and_sum_to_one():
