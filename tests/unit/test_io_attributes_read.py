@@ -40,7 +40,7 @@ def test_obj(tmp_path, caplog):
     np.testing.assert_array_equal(mesh.point_data["color"], [[1, 0, 0], [0, 1, 0], [0, 0, 1], [1, 1, 1]])
     uv = [[[0, 0], [1, 0], [0, 1]], [[1, 0], [0.5, 0.5], [0, 1]]]
     np.testing.assert_array_equal(mesh.corner_data["uv"], uv)
-    np.testing.assert_array_equal(mesh.corner_data["normal"], [[[0, 0, 1]] * 3, [[0, 0, 0]] * 3])
+    np.testing.assert_array_equal(mesh.corner_data["normal"], [[[0, 0, 1]] * 3, [[np.nan] * 3] * 3])
     for division, name in (("object", "thing #25"), ("group", "left part"), ("material", "dark wood")):
         assert mesh.regions[division].labels.tolist() == [0, 1]
         assert mesh.regions[division].names == {1: name}
@@ -49,7 +49,7 @@ def test_obj(tmp_path, caplog):
     assert mesh.fixed_points.tolist() == [2]
     assert mesh.materials == {"obj": {"mtllib": ("none.mtl",)}}
     assert "left out the materials of 'none.mtl': No such file" in caplog.text
-    assert "3 corner(s) of faces have no normal and get 0" in caplog.text
+    assert "3 corner(s) of faces have no normal and get NaN" in caplog.text
 
 
 def test_ply(tmp_path, caplog):
@@ -128,7 +128,7 @@ def test_medit(tmp_path, caplog):
         (3, 2): 0,
     }
     assert list(mesh.point_data) == ["normal"]
-    np.testing.assert_array_equal(mesh.point_data["normal"], [[0, 0, 1]] * 2 + [[0, 0, 0]] * 2)
+    np.testing.assert_array_equal(mesh.point_data["normal"], [[0, 0, 1]] * 2 + [[np.nan] * 3] * 2)
     assert rows(mesh.features) == {(0, 1), (1, 3), (2, 3)}
     assert mesh.fixed_points.tolist() == [0, 1, 2]
     assert "left out its sections Tangents" in caplog.text

@@ -7,7 +7,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from anisomesh.attributes.model import Mesh, Regions
-from anisomesh.io.carried import Array, Carried, Integers, Marked
+from anisomesh.io.carried import Array, Carried, Integers, Marked, listed
 from anisomesh.io.polygons import PolygonSoup, as_triangles
 from anisomesh.mesh.surface import Surface
 from anisomesh.mesh.topology import edge_keys
@@ -61,6 +61,7 @@ def as_mesh(soup: PolygonSoup) -> tuple[Mesh, tuple[str, ...], tuple[str, ...]]:
         fixed_point_regions=fixed_point_regions,
         materials=carried.materials,
     )
+    _say_empty_regions(carried, mesh)
     return mesh, triangles.remarks, tuple(dict.fromkeys(carried.remarks))
 
 
@@ -78,6 +79,27 @@ def _rows(carried: Carried, data: dict[str, Array], what: str, rows: Integers) -
         else:
             chosen[name] = values[rows].astype(values.dtype.newbyteorder("="))
     return chosen
+
+
+def _say_empty_regions(carried: Carried, mesh: Mesh) -> None:
+    """Say which names of regions are left out since no face, feature or fixed point is in the region."""
+    given = {name: list(texts) for name, texts in carried.named.items()}
+    for divisions in (carried.divisions, carried.lines.divisions, carried.fixed_points.divisions):
+        for name, division in divisions.items():
+            given.setdefault(name, []).extend(division.names.values())
+    told = []
+    for name, texts in given.items():
+        kept = {
+            text
+            for divisions in (mesh.regions, mesh.feature_regions, mesh.fixed_point_regions)
+            if name in divisions
+            for text in divisions[name].names.values()
+        }
+        empty = [text for text in dict.fromkeys(texts) if text and text not in kept]
+        if empty:
+            told.append(f"{name} {listed(list(map(repr, empty)))}")
+    if told:
+        carried.remarks.append(f"left out the names of regions with nothing in them: {'; '.join(told)}")
 
 
 def _features(carried: Carried, surface: Surface) -> tuple[Integers, dict[str, Regions]]:

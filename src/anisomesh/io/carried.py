@@ -32,6 +32,7 @@ _BROKEN = (
 _FEW_REGIONS = 8  # up to which integers with a telling name are regions in any case; heuristic
 _FACES_PER_REGION = 2  # at least, if there are more; heuristic
 _SURFACE = 2  # dimension
+_MAX_NAMES = 6  # in a remark
 _REGION = re.compile(
     r"(gmsh:)?(physical|geometrical)|medit:ref|reference|(domain|part|zone|block|region|material|group|object|solid)s?"
     r"|(cell_?entity|model_?face|domain|part|zone|block|region|material|group|object|face|boundary)_?(ids?|tags?|labels?)",
@@ -99,6 +100,8 @@ class Carried:
         Lines and points that a mesh is to keep.
     materials
         Whatever belongs to the file as a whole.
+    named
+        Names of regions by division that the file gives besides the ones of divisions, since nothing may be in them.
     remarks
         What was left out, a line each.
     """
@@ -110,6 +113,7 @@ class Carried:
     lines: Marked = field(default_factory=Marked)
     fixed_points: Marked = field(default_factory=Marked)
     materials: dict[str, Any] = field(default_factory=dict)
+    named: dict[str, list[str]] = field(default_factory=dict)
     remarks: list[str] = field(default_factory=list)
 
     @contextmanager
@@ -158,6 +162,12 @@ def _is_division(name: str, labels: Array, names: dict[int, str] | None) -> bool
         return False
     most = max(_FEW_REGIONS, len(labels) // _FACES_PER_REGION)
     return names is not None or (is_region(name) and len(np.unique(labels)) <= most)
+
+
+def listed(names: Sequence[str]) -> str:
+    """Return some names, and how many more there are, for a remark."""
+    more = f" and {len(names) - _MAX_NAMES:,} more" if len(names) > _MAX_NAMES else ""
+    return ", ".join(names[:_MAX_NAMES]) + more
 
 
 def is_region(name: str) -> bool:

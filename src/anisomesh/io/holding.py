@@ -6,9 +6,10 @@ from collections.abc import Mapping, Sequence
 from dataclasses import replace
 
 import numpy as np
+import numpy.typing as npt
 
 from anisomesh.attributes.model import Mesh, Regions
-from anisomesh.io.carried import Array, Integers
+from anisomesh.io.carried import NORMAL, Array, Integers
 from anisomesh.mesh.surface import Surface
 
 _PREFERRED = ("physical", "material", "group", "object", "solid", "node", "reference")  # divisions, if one is kept
@@ -16,6 +17,12 @@ _PREFERRED = ("physical", "material", "group", "object", "solid", "node", "refer
 
 OF_FEATURES, OF_FIXED_POINTS = "regions of feature edges", "regions of fixed points"
 """What a warning calls divisions of features and of fixed points."""
+
+EMPTY_REGIONS = "names of regions with nothing in them,"
+"""What a warning calls names of labels that no face, edge or point has."""
+
+TOO_LARGE = "whose integers are too large for float64"
+"""Why integers of 64 bits are left out."""
 
 _LARGEST_EXACT = 2**53  # up to it every integer has a float64
 
@@ -25,6 +32,7 @@ class Losses:
 
     def __init__(self) -> None:
         self._names: dict[str, list[str]] = {}
+        self._reasons: dict[tuple[str, str], str] = {}
         self._others: list[str] = []
         self._changed: list[str] = []
 
@@ -32,6 +40,11 @@ class Losses:
         """Add data of a kind, such as point data, with these names."""
         if names:
             self._names.setdefault(what, []).extend(name for name in names if name not in self._names.get(what, []))
+
+    def because(self, what: str, name: str, reason: str) -> None:
+        """Add data of a kind with the reason why these values are not held."""
+        self.add(what, name)
+        self._reasons[what, name] = reason
 
     def say(self, what: str) -> None:
         """Add something else."""
@@ -60,7 +73,11 @@ class Losses:
 
     def text(self) -> str:
         """Return everything in one line, empty if nothing is left out."""
-        parts = [f"{what} {', '.join(map(repr, names))}" for what, names in self._names.items()]
+        parts = []
+        for what, names in self._names.items():
+            plain = [repr(name) for name in names if (what, name) not in self._reasons]
+            parts += [f"{what} {', '.join(plain)}"] if plain else []
+            parts += [f"{what} {name!r}, {why}" for name in names if (why := self._reasons.get((what, name)))]
         if self._changed:
             parts.append(f"some characters of {len(self._changed)} name(s) such as {self._changed[0]!r}")
         return "; ".join([*parts, *self._others])
@@ -135,13 +152,32 @@ def by_label(*labels: Integers) -> list[tuple[tuple[int, ...], Integers]]:
     return list(zip(keys, np.split(order.astype(np.int64), begin[1:]), strict=True))
 
 
+def has_direction(normals: Array) -> npt.NDArray[np.bool_]:
+    """Return which vectors (..., k) are finite and have a length; normals that are missing are NaN or zero."""
+    return np.asarray(np.isfinite(normals).all(axis=-1) & normals.any(axis=-1))
+
+
+def share_not_finite(rows: Array, where: str) -> str:
+    """Return why data (n, k) are left out that are not finite at some points or corners, empty if they are finite."""
+    lacking = ~np.isfinite(rows).all(axis=1)
+    if not lacking.any():
+        return ""
+    what = "NaN" if np.isnan(rows[lacking]).any() else "infinite"
+    return f"which are {what} at {np.count_nonzero(lacking):,} of {len(rows):,} {where}"
+
+
+def share_lacking(lacking: npt.NDArray[np.bool_], where: str) -> str:
+    """Return why data are left out that some rows (n,) lack, at points, corners or faces."""
+    return f"which {np.count_nonzero(lacking):,} of {len(lacking):,} {where} lack"
+
+
 def continuous_corner_data(mesh: Mesh, losses: Losses) -> dict[str, Array]:
     """Return the corner data that are the same in all faces at each point as point data; the others are lost."""
     kept = {}
     points = mesh.surface.faces.ravel()
     for name, values in mesh.corner_data.items():
         rows = values.reshape(len(points), *values.shape[2:])
-        at_points = np.zeros((mesh.surface.n_points, *values.shape[2:]), dtype=values.dtype)
+        at_points = _blank(name, mesh.surface.n_points, values)
         at_points[points] = rows
         same = at_points[points] == rows
         if values.dtype.kind in "fc":
@@ -151,6 +187,14 @@ def continuous_corner_data(mesh: Mesh, losses: Losses) -> dict[str, Array]:
         else:
             losses.add("corner data", name)
     return kept
+
+
+def _blank(name: str, count: int, values: Array) -> Array:
+    """Return rows (count, ...) for corner data (F, 3, ...) at points that no face uses: 0, of normals NaN."""
+    rows = np.zeros((count, *values.shape[2:]), dtype=values.dtype)
+    if name == NORMAL and values.dtype.kind == "f":
+        rows[:] = np.nan
+    return rows
 
 
 def distinct_corners(mesh: Mesh, chosen: Integers) -> tuple[Integers, Integers]:
@@ -188,7 +232,7 @@ def with_points_repeated(mesh: Mesh) -> tuple[Mesh, Integers]:
     point_data = {name: values[source] for name, values in mesh.point_data.items()}
     for name, values in apart.items():
         rows = values.reshape(faces.size, *values.shape[2:])
-        point_data[name] = np.zeros((len(source), *values.shape[2:]), dtype=values.dtype)
+        point_data[name] = _blank(name, len(source), values)
         point_data[name][place] = rows[corners]
     surface = Surface(own.points[source], place[numbers])
     return replace(mesh, surface=surface, point_data=point_data, corner_data={}), source

@@ -9,7 +9,7 @@ import numpy as np
 from anisomesh.attributes.model import Mesh
 from anisomesh.io.carried import COLOUR, NORMAL, UV, Array, Carried
 from anisomesh.io.formats.words import coordinates, integers
-from anisomesh.io.holding import Losses, continuous_corner_data
+from anisomesh.io.holding import Losses, continuous_corner_data, has_direction, share_lacking
 from anisomesh.io.polygons import PolygonSoup
 
 _BYTE = 255
@@ -95,7 +95,10 @@ def off_bytes(mesh: Mesh, losses: Losses) -> bytes:
     point_data = {**mesh.point_data, **continuous_corner_data(mesh, losses)}
     for name, letters, widths in ((NORMAL, "N", (3,)), (COLOUR, "C", (3, 4)), (UV, "ST", (2,))):
         columns = _columns(point_data.get(name), widths)
-        if columns is not None:
+        if name == NORMAL and columns is not None and not (has := has_direction(columns[0])).all():
+            losses.because("point data", name, share_lacking(~has, "points"))
+            del point_data[name]
+        elif columns is not None:
             parts.append(columns[0])
             pattern, head = pattern + columns[1], letters + head
             del point_data[name]

@@ -4,13 +4,13 @@ from __future__ import annotations
 
 import json
 import re
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterable, Sequence
 
 import numpy as np
 
 from anisomesh.attributes.model import Regions
 from anisomesh.io.carried import Carried, Division, Integers
-from anisomesh.io.holding import Losses
+from anisomesh.io.holding import EMPTY_REGIONS, Losses
 
 _NUMBERED = "region_"  # in front of the number of a region without a name
 _NUMBER = re.compile(rf"{_NUMBERED}(-?\d{{1,18}})")
@@ -31,6 +31,17 @@ def in_a_line(text: str) -> str:
     return " ".join(text.split("\n"))
 
 
+def also_named(carried: Carried, division: str, texts: Iterable[str]) -> None:
+    """Add names of regions that a file gives, whether there is anything in these or not."""
+    carried.named.setdefault(division, []).extend(text for text in texts if text and not is_number(text))
+
+
+def empty_regions(regions: Regions) -> list[str]:
+    """Return the names of regions that have no face, edge or point."""
+    present = set(np.unique(regions.labels).tolist())
+    return [text for label, text in regions.names.items() if text and label not in present]
+
+
 def region_texts(
     regions: Regions, losses: Losses, written: Callable[[str], str] = exactly, *, distinct: bool = False
 ) -> dict[int, str]:
@@ -41,7 +52,7 @@ def region_texts(
     regions
         The regions.
     losses
-        Names that the format changes are added.
+        Names that the format changes are added, and names of regions with nothing in them.
     written
         Returns a name as the format can write it.
     distinct
@@ -54,6 +65,7 @@ def region_texts(
         texts[label] = f"{text}_{label}" if distinct and text in texts.values() else text
         if name and texts[label] != name:
             losses.changed(name)
+    losses.add(EMPTY_REGIONS, *empty_regions(regions))
     return texts
 
 

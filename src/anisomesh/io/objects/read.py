@@ -10,6 +10,7 @@ import numpy as np
 
 from anisomesh.io.carried import Array, Carried, Division, Integers
 from anisomesh.io.cells import Shape, SurfaceCells
+from anisomesh.io.formats.region_names import also_named
 from anisomesh.io.formats.vtk.data import NAMES_OF_REGIONS
 from anisomesh.io.formats.vtk.pieces import Piece, Pieces
 from anisomesh.io.objects.trimesh_scenes import scene_soup
@@ -133,6 +134,10 @@ def _carry_meshio(mesh: Any, carried: Carried) -> None:
     carried.point_data |= _arrays(mesh.point_data)
     groups = {name: np.ravel(value).tolist() for name, value in mesh.field_data.items()}
     names = [{value[0]: name for name, value in groups.items() if value[1:] == [d]} for d in range(_N_DIMENSIONS)]
+    also_named(carried, MESHIO_DIVISIONS["gmsh:physical"], (text for of in names for text in of.values()))
+    volumes = [name for name, value in groups.items() if value[1:] == [_N_DIMENSIONS]]
+    if volumes:
+        carried.remarks.append(f"left out physical groups of volumes: {', '.join(volumes)}")
     for name, blocks in mesh.cell_data.items():
         with carried.optional(f"cell data {name!r}"):
             labelled = names if name == "gmsh:physical" else [None] * _N_DIMENSIONS

@@ -10,6 +10,7 @@ import numpy.typing as npt
 
 from anisomesh.io.carried import COLOUR, NORMAL, UV, Array, Carried
 from anisomesh.io.formats.gltf.document import COMPONENTS, WIDTHS, Document, as_numbers
+from anisomesh.io.holding import has_direction, share_lacking, share_not_finite
 from anisomesh.mesh.geometry import unit
 
 TANGENT = "tangent"
@@ -114,11 +115,17 @@ class Encoded(NamedTuple):
     normalised: bool
 
 
-def encoded(name: str, values: Array) -> Encoded | None:
-    """Return point data (n,) or (n, k) as an attribute of glTF, None if it cannot hold them."""
+def encoded(name: str, values: Array, where: str = "points") -> Encoded | str:
+    """Return data (n,) or (n, k) at points or corners as an attribute of glTF, or why it cannot hold them."""
     rows = values.reshape(len(values), -1)
-    if rows.dtype.kind not in "biuf" or rows.shape[1] not in WIDTHS.values() or not np.isfinite(rows).all():
-        return None
+    if rows.dtype.kind not in "biuf":
+        return f"which are of type {rows.dtype}"
+    if rows.shape[1] not in WIDTHS.values():
+        return f"which have {rows.shape[1]} components"
+    if reason := share_not_finite(rows, where):
+        return reason
+    if name == NORMAL and rows.shape[1] == 3 and not (has := has_direction(rows)).all():
+        return share_lacking(~has, where)
     width, kind = rows.shape[1], rows.dtype.str[1:]
     numbered = _SET.fullmatch(name)
     if numbered and numbered[1] == UV and width == 2:
@@ -134,18 +141,18 @@ def encoded(name: str, values: Array) -> Encoded | None:
             return Encoded(name, rows.astype(np.float32), False)
         if rows.dtype.kind in "iu" and rows.min() >= 0 and rows.max() <= np.iinfo(np.uint16).max:
             return Encoded(name, rows if kind == "u1" else rows.astype(np.uint16), False)
-        return None
+        return "which are not numbers of joints"
     return _custom(name, rows)
 
 
-def _custom(name: str, rows: Array) -> Encoded | None:
-    """Return data without a meaning in glTF, whose names begin with an underscore there."""
+def _custom(name: str, rows: Array) -> Encoded | str:
+    """Return data without a meaning in glTF, whose names begin with an underscore there, or why it cannot hold them."""
     kind = rows.dtype.str[1:]
     if rows.dtype.kind == "b":
         rows = rows.astype(np.uint8)
     elif kind not in COMPONENTS.values() or kind == "u4":  # u4 is for indices only
         if rows.dtype.kind in "iu" and (rows.min() < -_LARGEST_IN_FLOAT32 or rows.max() > _LARGEST_IN_FLOAT32):
-            return None
+            return "whose integers are too large for float32"
         with np.errstate(over="ignore"):
             rows = rows.astype(np.float32)
-    return Encoded("_" + name, rows, False) if np.isfinite(rows).all() else None
+    return Encoded("_" + name, rows, False) if np.isfinite(rows).all() else "whose numbers are too large for float32"

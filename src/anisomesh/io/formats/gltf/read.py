@@ -10,12 +10,12 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from anisomesh.io.carried import Carried
+from anisomesh.io.carried import Carried, listed
 from anisomesh.io.cells import SurfaceCells, strip_triangles
 from anisomesh.io.formats.gltf.attributes import Attributes, read_attributes
 from anisomesh.io.formats.gltf.document import Document, index_of
 from anisomesh.io.formats.gltf.materials import read_materials
-from anisomesh.io.formats.region_names import divide, is_number
+from anisomesh.io.formats.region_names import also_named, divide, is_number
 from anisomesh.io.polygons import Integers, PolygonSoup
 
 NODE, MATERIAL = "node", "material"
@@ -57,6 +57,7 @@ class _Scene:
         self._n_instances = 0
         self._coarser = _coarser_levels(self._json)
         self._carried = Carried()
+        self._seen: dict[int, int] = {}  # mesh of each node that is read, or of itself in a file without scenes
         self._attributes = Attributes()
         self._known: dict[Any, int] = {}  # first point of vertices that several primitives share
         self._nodes: list[Integers] = [np.zeros(0, dtype=np.int64)]
@@ -81,9 +82,25 @@ class _Scene:
         remarks = []
         if _COPIES in self._json.get("extensionsUsed", []):
             remarks.append(f"left out copies of its meshes that {_COPIES} makes")
+        hidden = self._hidden_meshes()
+        if hidden:
+            remarks.append(f"left out {len(hidden)} mesh(es) that are not in its scene: {listed(hidden)}")
         if self._coarser:
             remarks.append(f"read its finest level of detail; coarser ones left out ({LEVELS}): {len(self._coarser)}")
         return tuple(remarks)
+
+    def _hidden_meshes(self) -> list[str]:
+        """Return the names, or numbers, of meshes that the scene does not have, not even as coarser levels."""
+        nodes, below, known = self._json.get("nodes", []), list(self._coarser), set(self._seen.values())
+        done: set[int] = set()
+        while below:
+            node = below.pop()
+            if node not in done and node < len(nodes):
+                done.add(node)
+                below += nodes[node].get("children", [])
+                known.add(nodes[node].get("mesh"))
+        meshes = enumerate(self._json.get("meshes", []))
+        return [repr(mesh["name"]) if mesh.get("name") else str(k) for k, mesh in meshes if k not in known]
 
     def _carry(self) -> None:
         """Collect everything besides triangles."""
@@ -94,6 +111,7 @@ class _Scene:
         with carried.optional("its nodes"):
             used = np.unique(nodes).tolist()
             texts = [self._node_name(label) for label in used]
+            also_named(carried, NODE, map(self._node_name, self._seen))
             if any(texts) or len(used) > 1:
                 divide(carried, NODE, nodes, texts, used)
         with carried.optional("its materials"):
@@ -102,8 +120,9 @@ class _Scene:
                 texts = [str(material.get("name", "")) for material in given]
                 if any(map(is_number, texts)) and all(material.keys() == {"name"} for material in given):
                     divide(carried, MATERIAL, materials, texts, range(len(texts)))
-                else:
-                    names = {k: text for k, text in enumerate(texts) if text}
+                else:  # all are handed on, with their names
+                    used = set(np.unique(materials).tolist())
+                    names = {k: text for k, text in enumerate(texts) if text and k in used}
                     carried.add_cell_data(MATERIAL, materials, names=names)
                     carried.materials["gltf"] = read_materials(self._document)
         left = [name for name in _NOT_KEPT if self._json.get(name)]
@@ -133,6 +152,7 @@ class _Scene:
             self._add_node(child, matrix, depth + 1)
 
     def _add_mesh(self, index: int, matrix: npt.NDArray[np.float64], node: int) -> None:
+        self._seen[node] = index
         for primitive in self._json["meshes"][index_of(index)]["primitives"]:
             mode = primitive.get("mode", TRIANGLES)
             if mode < TRIANGLES:

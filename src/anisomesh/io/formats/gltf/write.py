@@ -168,9 +168,12 @@ def _attributes(mesh: Mesh, losses: Losses) -> list[_Attribute]:
     corner_data = {name: values.reshape(-1, *values.shape[2:]) for name, values in mesh.corner_data.items()}
     for what, data in (("point data", mesh.point_data), ("corner data", corner_data)):
         for name, values in data.items():
-            attribute = encoded(name, values) if values.size else None
-            if attribute is None or any(attribute.name == other.data.name for other in found):
-                losses.add(what, name)
+            where = "points" if data is mesh.point_data else "corners"
+            attribute = encoded(name, values, where) if values.size else "which are empty"
+            if isinstance(attribute, str):
+                losses.because(what, name, attribute)
+            elif any(attribute.name == other.data.name for other in found):
+                losses.because(what, name, f"whose name in glTF, {attribute.name}, is taken")
             else:
                 found.append(_Attribute(attribute, at_corners=what == "corner data"))
     return found

@@ -14,6 +14,7 @@ import numpy.typing as npt
 from anisomesh.io.carried import Array, Carried, Integers, grouped_columns, is_region
 from anisomesh.io.formats.gmsh.elements import PHYSICAL, Entities
 from anisomesh.io.formats.gmsh.numbers import NumberStream
+from anisomesh.io.formats.region_names import also_named
 from anisomesh.io.formats.words import whole
 
 COMMENT = "anisomesh regions"
@@ -92,6 +93,8 @@ def read_physical_names(data: bytes, carried: Carried) -> None:
                 others.append(text)
             elif PHYSICAL in divisions[int(dimension)]:
                 divisions[int(dimension)][PHYSICAL].names[int(number)] = text
+            else:
+                also_named(carried, PHYSICAL, [text])
     if others:
         carried.remarks.append(f"left out physical groups of volumes: {', '.join(others)}")
     skipped = [name.decode() for name in _SKIPPED if b"$" + name in data]

@@ -13,10 +13,12 @@ from anisomesh.attributes.model import Mesh, Regions
 from anisomesh.io.carried import Array, Integers, separate_columns
 from anisomesh.io.formats.gmsh.data import COMMENT, UNLABELLED
 from anisomesh.io.formats.gmsh.elements import LINE, PHYSICAL, POINT, TRIANGLE, entities_of
-from anisomesh.io.formats.region_names import in_a_line, region_texts
+from anisomesh.io.formats.region_names import empty_regions, in_a_line, region_texts
 from anisomesh.io.holding import (
+    EMPTY_REGIONS,
     OF_FEATURES,
     OF_FIXED_POINTS,
+    TOO_LARGE,
     Losses,
     continuous_corner_data,
     fits_int32,
@@ -43,6 +45,7 @@ def msh_bytes(mesh: Mesh, losses: Losses) -> bytes:
     physical, geometrical, others = _divisions(mesh, losses)
     names = {} if physical is None else region_texts(physical, Losses(), _quotable)
     labels = np.zeros(len(faces), dtype=np.int64) if physical is None else physical.labels
+    losses.add(EMPTY_REGIONS, *([] if physical is None else empty_regions(physical)))
     curves = _marked(mesh.features, mesh.feature_regions, OF_FEATURES, losses)
     vertices = _marked(mesh.fixed_points[:, None], mesh.fixed_point_regions, OF_FIXED_POINTS, losses)
     unlabelled = _unused_number(vertices.physical) if (vertices.physical == 0).any() else 0
@@ -77,8 +80,10 @@ def msh_bytes(mesh: Mesh, losses: Losses) -> bytes:
 def _exact(data: Mapping[str, Array], what: str, losses: Losses) -> dict[str, Array]:
     """Return the arrays of numbers that float64 holds exactly."""
     numbers = numeric(data, what, losses)
-    losses.add(what, *(name for name, values in numbers.items() if not is_exact_in_float64(values)))
-    return {name: values for name, values in numbers.items() if is_exact_in_float64(values)}
+    exact = {name: values for name, values in numbers.items() if is_exact_in_float64(values)}
+    for name in (name for name in numbers if name not in exact):
+        losses.because(what, name, TOO_LARGE)
+    return exact
 
 
 def _nodes(points: Points) -> bytes:

@@ -94,9 +94,13 @@ def _carried(
                 raise ValueError("truncated: it has no section Normals")
             normals = table(sections["Normals"], dimension, 0)
             place = whole(table(sections["NormalAtVertices"], 0, 2)) - 1
-            values = np.zeros((len(of_points), 3))
-            values[_within(place[:, 0], len(values)), :dimension] = normals[_within(place[:, 1], len(normals))]
-            carried.point_data[NORMAL] = values
+            values = np.full((len(of_points), 3), np.nan)
+            rows = np.pad(normals, ((0, 0), (0, SPACE - dimension)))
+            values[_within(place[:, 0], len(values))] = rows[_within(place[:, 1], len(normals))]
+            if len(place):
+                carried.point_data[NORMAL] = values
+            if (missing := np.count_nonzero(np.isnan(values).all(axis=1))) and len(place):
+                carried.remarks.append(f"{missing} of {len(values)} vertices have no normal and get NaN")
     unknown = [name for name in sections if name not in _USED and name not in _WITHOUT_CONTENT]
     if unknown:
         carried.remarks.append("left out its sections " + ", ".join(unknown)[:200])

@@ -13,6 +13,7 @@ from anisomesh.io.holding import (
     OF_FIXED_POINTS,
     Losses,
     continuous_corner_data,
+    has_direction,
     held_division,
     main_division,
 )
@@ -84,11 +85,12 @@ def _fixed_points(mesh: Mesh) -> list[Rows]:
 
 
 def _normals(normals: Array | None, losses: Losses) -> list[Rows]:
-    """Return a normal for each vertex."""
+    """Return the normals of the vertices that have one."""
     if normals is None:
         return []
     if normals.dtype.kind != "f" or normals.shape[1:] != (3,):
         losses.add("point data", NORMAL)
         return []
-    numbers = np.arange(1, len(normals) + 1)
-    return [of_reals("Normals", normals), of_integers("NormalAtVertices", numbers, numbers)]
+    given = has_direction(normals)
+    numbers = np.arange(1, np.count_nonzero(given) + 1)
+    return [of_reals("Normals", normals[given]), of_integers("NormalAtVertices", np.flatnonzero(given) + 1, numbers)]

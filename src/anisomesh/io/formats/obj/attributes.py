@@ -6,7 +6,7 @@ import numpy as np
 
 from anisomesh.io.carried import COLOUR, NORMAL, UV, Array, Carried, Integers
 from anisomesh.io.formats.obj.lines import Lines
-from anisomesh.io.formats.region_names import divide, numbered_regions
+from anisomesh.io.formats.region_names import also_named, divide, numbered_regions
 from anisomesh.io.formats.words import LINES_AT_ONCE, quick_numbers, word_starts
 
 SMOOTHING = "smoothing_group"
@@ -17,6 +17,8 @@ DIVISIONS = {"object": b"o", "group": b"g", "material": b"usemtl"}
 
 OF_LINES = ("object", "group")
 """The divisions that lines have too."""
+
+_DEFAULT = "default"  # the name of what has none, by specification
 
 LIBRARIES = "mtllib"
 """Key of the names of the material files."""
@@ -101,9 +103,12 @@ def take_corner_data(file: Lines, words: list[list[bytes]] | Integers, sizes: In
             if len(wrong):
                 raise ValueError(f"a face refers to {word.decode()} {chosen[wrong[0]]} of {len(table)}")
             rows = table[np.where(missing, 0, place)]
-            rows[missing] = 0.0
+            rows[missing] = np.nan if name == NORMAL else 0.0
             if missing.any():
-                carried.remarks.append(f"{np.count_nonzero(missing)} corner(s) of faces have no {name} and get 0")
+                filled = "NaN" if name == NORMAL else "0"
+                carried.remarks.append(
+                    f"{np.count_nonzero(missing)} corner(s) of faces have no {name} and get {filled}"
+                )
             carried.corner_data[name] = rows
 
 
@@ -115,13 +120,16 @@ def take_divisions(file: Lines, carried: Carried) -> None:
     for name, word in DIVISIONS.items():
         with carried.optional(f"its {name}s"):
             given = file.of(word)
-            texts = [file.rest(k) or "default" for k in given]
+            texts = [file.rest(k) or _DEFAULT for k in given]
+            also_named(carried, name, (text for text in texts if text != _DEFAULT))
             number = {text: k + 1 for k, text in enumerate(dict.fromkeys(texts))}
             labels = np.array([0, *(number[text] for text in texts)], dtype=np.int64)
             of_faces = labels[np.searchsorted(given, file.face_lines)]
             if of_faces.any():
                 before = [0] if (of_faces == 0).any() else []  # the label in front of the first one
-                divide(carried, name, of_faces, [*[""] * len(before), *number], [*before, *number.values()])
+                present = set(of_faces.tolist())
+                used = {text: label for text, label in number.items() if label in present}
+                divide(carried, name, of_faces, [*[""] * len(before), *used], [*before, *used.values()])
     with carried.optional("its smoothing groups"):
         given = file.of(b"s")
         labels = np.array([0, *(0 if file.rest(k) in ("off", "") else int(file.rest(k)) for k in given)])

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
+from functools import partial
 from itertools import pairwise
 
 import numpy as np
@@ -12,7 +13,7 @@ from anisomesh.io.carried import COLOUR, NORMAL, UV, Array, Integers
 from anisomesh.io.formats.obj.attributes import DIVISIONS, OF_LINES, SMOOTHING
 from anisomesh.io.formats.region_names import in_words, region_texts
 from anisomesh.io.formats.words import format_rows
-from anisomesh.io.holding import OF_FEATURES, OF_FIXED_POINTS, Losses, main_division
+from anisomesh.io.holding import OF_FEATURES, OF_FIXED_POINTS, Losses, has_direction, main_division
 
 States = list[tuple[str, Integers, dict[int, str]]]
 """What changes between elements: the word, the label of each element (n,), and the text for each label."""
@@ -25,7 +26,7 @@ def obj_bytes(mesh: Mesh, losses: Losses) -> bytes:
     -----
     Regions keep their names, not their numbers. Faces are in the order of their regions if they would change back and
     forth between them otherwise. Features that are in no region are in front of the faces, in front of the first
-    group.
+    group. Faces have normals, and texture coordinates, if all their corners do.
     """
     faces = mesh.surface.faces
     lines = [_points(mesh)]
@@ -33,15 +34,19 @@ def obj_bytes(mesh: Mesh, losses: Losses) -> bytes:
     for name, word, widths in ((UV, "vt", (2, 3)), (NORMAL, "vn", (3,))):
         rows, numbers = _at_corners(mesh, name, widths)
         columns.append(numbers)
+        partly = 0 if numbers is None else np.count_nonzero((numbers > 0).any(axis=1) & (numbers == 0).any(axis=1))
+        if partly:
+            losses.say(f"the {name} at {partly} face(s), some corners of which have none")
         if rows is not None:
             lines.append(format_rows(word + " %r" * rows.shape[1] + "\n", rows))
     states = _states(mesh, losses)
     of_lines = _states_of_lines(mesh, states, losses)
     is_labelled = np.any([np.zeros(len(mesh.features), dtype=bool), *(state[1] != 0 for state in of_lines)], axis=0)
     lines.append(format_rows("l %d %d\n", mesh.features[~is_labelled] + 1))
-    lines.append(_in_states(_pattern_of_faces(columns), _table_of_faces(columns, len(faces)), states))
+    lines.append(_in_states(partial(_lines_of_faces, columns), len(faces), states))
     labelled = [(word, labels[is_labelled], texts) for word, labels, texts in of_lines]
-    lines.append(_in_states("l %d %d\n", mesh.features[is_labelled] + 1, labelled))
+    ends = mesh.features[is_labelled] + 1
+    lines.append(_in_states(lambda chosen: format_rows("l %d %d\n", ends[chosen]), len(ends), labelled))
     lines.append(format_rows("p %d\n", mesh.fixed_points + 1))
     held = [name for name, numbers in zip((UV, NORMAL), columns[1:], strict=True) if numbers is not None]
     losses.add("corner data", *(name for name in mesh.corner_data if name not in held))
@@ -71,17 +76,27 @@ def _colours(mesh: Mesh) -> Array | None:
 
 
 def _at_corners(mesh: Mesh, name: str, widths: tuple[int, ...]) -> tuple[Array | None, Integers | None]:
-    """Return different rows of data at points or corners, and the number of the row of each corner (F, 3) from 1."""
+    """Return different rows of data at points or corners, and the number of the row of each corner (F, 3) from 1.
+
+    The number is 0 where a corner has no direction, or numbers that are not finite; both are None if no corner has any.
+    """
     faces = mesh.surface.faces.astype(np.int64)
     given = mesh.corner_data.get(name, mesh.point_data.get(name))
     if given is None or given.dtype.kind not in "fiu" or given.shape[-1:] not in [(width,) for width in widths]:
         return None, None
-    if name in mesh.point_data:
-        return (given.astype(np.float64), faces + 1) if given.ndim == 2 else (None, None)
-    if given.ndim != 3:
+    at_points = name in mesh.point_data
+    if given.ndim != (2 if at_points else 3):
         return None, None
-    rows, numbers = np.unique(given.reshape(-1, given.shape[2]).astype(np.float64), axis=0, return_inverse=True)
-    return rows, numbers.reshape(-1, 3).astype(np.int64) + 1
+    rows = given.reshape(-1, given.shape[-1]).astype(np.float64)
+    has = has_direction(rows) if name == NORMAL else np.isfinite(rows).all(axis=1)
+    numbers = np.zeros(len(rows), dtype=np.int64)
+    if at_points:
+        rows, numbers[has] = rows[has], np.arange(1, np.count_nonzero(has) + 1)
+        numbers = numbers[faces]
+    elif has.any():
+        rows, place = np.unique(rows[has], axis=0, return_inverse=True)
+        numbers[has] = place.reshape(-1) + 1
+    return (rows, numbers.reshape(-1, 3)) if numbers.any() else (None, None)
 
 
 def _states(mesh: Mesh, losses: Losses) -> States:
@@ -134,24 +149,26 @@ def _in_slots(regions: Mapping[str, Regions], slots: tuple[str, ...], what: str,
     return found
 
 
-def _pattern_of_faces(columns: list[Integers | None]) -> str:
-    """Return the pattern of a line of a face."""
-    _, of_texture, of_normal = columns
-    corner = "%d" + ("/%d" if of_texture is not None else "/" if of_normal is not None else "")
-    corner += "/%d" if of_normal is not None else ""
-    return f"f {corner} {corner} {corner}\n"
+def _lines_of_faces(columns: list[Integers | None], chosen: Integers) -> str:
+    """Return the lines of some faces (n,), with the columns that have a number at all corners of a face."""
+    rows = [None if column is None else column[chosen] for column in columns]
+    full = np.stack([np.zeros(len(chosen), dtype=bool) if c is None else (c > 0).all(axis=1) for c in rows], axis=1)
+    begin = [0, *(np.flatnonzero((full[1:] != full[:-1]).any(axis=1)) + 1).tolist(), len(chosen)]
+    lines = []
+    for first, end in pairwise(begin):
+        _, has_texture, has_normal = full[first].tolist()
+        corner = "%d" + ("/%d" if has_texture else "/" if has_normal else "") + ("/%d" if has_normal else "")
+        held = [
+            c[first:end] for c, is_full in zip(rows, full[first].tolist(), strict=True) if is_full and c is not None
+        ]
+        lines.append(format_rows(f"f {corner} {corner} {corner}\n", np.stack(held, axis=2).reshape(end - first, -1)))
+    return "".join(lines)
 
 
-def _table_of_faces(columns: list[Integers | None], count: int) -> Integers:
-    """Return the numbers in the lines of faces (F, k)."""
-    return np.stack([column for column in columns if column is not None], axis=2).reshape(count, -1)
-
-
-def _in_states(pattern: str, table: Integers, states: States) -> str:
-    """Return the lines of elements, with a line wherever a state changes."""
-    count = len(table)
+def _in_states(lines_of: Callable[[Integers], str], count: int, states: States) -> str:
+    """Return the lines of a number of elements, given as a function of some, with a line wherever a state changes."""
     if not states or count == 0:
-        return format_rows(pattern, table)
+        return lines_of(np.arange(count)) if count else ""
     labels = np.stack([state[1] for state in states], axis=1)
     order = np.arange(count)
     changes = (labels[1:] != labels[:-1]).any(axis=1)
@@ -167,5 +184,5 @@ def _in_states(pattern: str, table: Integers, states: States) -> str:
             if now[k] != before[k] and not (before[k] is None and word == "s" and now[k] == 0):
                 lines.append(f"{word} {texts[now[k]]}".rstrip() + "\n")
                 before[k] = now[k]
-        lines.append(format_rows(pattern, table[order[first:end]]))
+        lines.append(lines_of(order[first:end]))
     return "".join(lines)

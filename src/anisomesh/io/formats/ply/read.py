@@ -10,7 +10,7 @@ from anisomesh.io.carried import COLOUR, NORMAL, UV, Array, Carried, Integers, g
 from anisomesh.io.cells import SurfaceCells, strip_triangles
 from anisomesh.io.formats.ply.body import BinaryBody, PropertyValues, TextBody
 from anisomesh.io.formats.ply.header import EDGE_REGIONS, NAME, REGIONS, TEXTURE_FILE, Element, read_header
-from anisomesh.io.formats.region_names import unquoted
+from anisomesh.io.formats.region_names import also_named, unquoted
 from anisomesh.io.formats.words import whole
 from anisomesh.io.polygons import PolygonSoup
 
@@ -134,6 +134,7 @@ def _add_edges(element: Element, columns: Columns, comments: list[str], carried:
     for name in [name for name in columns if name in divisions]:
         with carried.optional(f"the regions {name!r} of edges"):
             names = {int(words[2]): unquoted(words[3]) for words in said if words[1:2] == [name] and len(words) == 4}
+            also_named(carried, name, names.values())
             carried.lines.divide(name, whole(columns.pop(name).values), names)
     if columns:
         carried.remarks.append(f"left out the properties {', '.join(columns)} of edges")

@@ -13,6 +13,7 @@ from anisomesh.io.formats.region_names import quoted
 from anisomesh.io.holding import (
     OF_FEATURES,
     OF_FIXED_POINTS,
+    TOO_LARGE,
     Losses,
     flat_rows,
     is_exact_in_float64,
@@ -85,8 +86,10 @@ def _add_columns(columns: dict[str, Array], data: Mapping[str, Array], what: str
         usual = _COLUMNS.get((name, rows.shape[1])) if rows.ndim == 2 else None
         found = dict(zip(usual, rows.T, strict=True)) if usual else separate_columns({_word(name): rows})
         exact = {key: _exact(column) for key, column in found.items()}
-        if exact.keys() & columns.keys() or any(column is None for column in exact.values()):
-            losses.add(what, name)
+        if any(column is None for column in exact.values()):
+            losses.because(what, name, TOO_LARGE)
+        elif exact.keys() & columns.keys():
+            losses.because(what, name, "whose names in PLY are taken")
         else:
             columns |= {key: column for key, column in exact.items() if column is not None}
 
@@ -107,8 +110,12 @@ def _corner_lists(face: Mapping[str, Array], data: Mapping[str, Array], losses: 
     for name, values in data.items():
         rows = _exact(flat_rows(values))
         key = _UV_LIST if name == UV and values.shape[2:] == (2,) else _word(name)
-        if rows is None or key in lists or key in face or rows.shape[1] > _MAX_LIST:
-            losses.add("corner data", name)
+        if rows is None:
+            losses.because("corner data", name, TOO_LARGE)
+        elif key in lists or key in face:
+            losses.because("corner data", name, "whose name in PLY is taken")
+        elif rows.shape[1] > _MAX_LIST:
+            losses.because("corner data", name, f"which have {rows.shape[1]} numbers at a face")
         else:
             lists[key] = rows
     return lists

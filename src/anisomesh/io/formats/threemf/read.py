@@ -15,9 +15,10 @@ from xml.parsers import expat
 import numpy as np
 import numpy.typing as npt
 
-from anisomesh.io.carried import Carried
+from anisomesh.io.carried import Carried, listed
 from anisomesh.io.cells import SurfaceCells
-from anisomesh.io.formats.threemf.properties import TEXTURES, Properties
+from anisomesh.io.formats.region_names import also_named
+from anisomesh.io.formats.threemf.properties import MATERIAL, OBJECT, TEXTURES, Properties
 from anisomesh.io.formats.threemf.resources import CORE, NONE, Resources, number
 from anisomesh.io.polygons import Integers, PolygonSoup
 
@@ -64,8 +65,11 @@ def read_3mf(data: bytes) -> PolygonSoup:
         items = root.items or [(("", other), "") for other in root.objects]
         for (path, other), transform in items:
             build.add((path or build.root, other), _matrix(transform), 0)
-        remarks = tuple(f"left out its {name}, which are not triangles" for name in sorted(build.ignored & _SHAPES))
-        return build.cells.soup(np.concatenate(build.points), remarks, build.carry())
+        remarks = [f"left out its {name}, which are not triangles" for name in sorted(build.ignored & _SHAPES)]
+        hidden = build.not_built()
+        if hidden:
+            remarks.append(f"left out {len(hidden)} object(s) that it does not build: {listed(hidden)}")
+        return build.cells.soup(np.concatenate(build.points), tuple(remarks), build.carry())
 
 
 class _Build:
@@ -78,6 +82,8 @@ class _Build:
         self.cells = SurfaceCells()
         self.points: list[npt.NDArray[np.float64]] = [np.zeros((0, 3))]
         self.ignored: set[str] = set()
+        self._built: set[tuple[str, str]] = set()
+        self._empty: list[str] = []  # names of objects without triangles
         self._n_points = self._n_instances = 0
         self._properties = Properties()
 
@@ -98,8 +104,11 @@ class _Build:
         found = self.model(key[0]).objects.get(key[1])
         if found is None:
             raise ValueError(f"truncated or malformed: it has no object {key[1]!r} in {key[0]}")
+        self._built.add((key[0].lstrip("/"), key[1]))
         for (path, other), transform in found.components:
             self.add((path or key[0], other), _product(_matrix(transform), matrix), depth + 1)
+        if not found.faces and not found.components:
+            self._empty.append(found.name)
         if found.faces:
             points = np.array(found.points, dtype=np.float64).reshape(-1, 3)
             faces: Integers = np.array(found.faces, dtype=np.int64).reshape(-1, 3)
@@ -116,9 +125,19 @@ class _Build:
             self.points.append(moved)
             self._n_points += len(points)
 
+    def not_built(self) -> list[str]:
+        """Return the names, or numbers, of objects with triangles that are not built."""
+        objects = [((part, key), found) for part, model in self._models.items() for key, found in model.objects.items()]
+        return [
+            repr(each.name) if each.name else key[1] for key, each in objects if each.faces and key not in self._built
+        ]
+
     def carry(self) -> Carried:
         """Return everything besides triangles."""
         carried = Carried()
+        also_named(carried, OBJECT, self._empty)
+        groups = [group for model in self._models.values() for group in model.resources.materials.values()]
+        also_named(carried, MATERIAL, (name for group in groups for name, _ in group))
         for path, label in self._properties.carry(carried).items():
             with carried.optional(f"the image of the texture {path!r}"):
                 carried.materials[TEXTURES][label]["data"] = _entry(self._archive, path)

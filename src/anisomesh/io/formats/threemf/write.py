@@ -17,7 +17,7 @@ from anisomesh.io.formats.threemf.read import MODEL_TYPE, ROOT
 from anisomesh.io.formats.threemf.resources import CORE, MATERIALS
 from anisomesh.io.formats.threemf.textures import Images, Textured, in_xml, textured
 from anisomesh.io.formats.words import format_rows
-from anisomesh.io.holding import Losses, by_label, main_division
+from anisomesh.io.holding import Losses, by_label, main_division, share_not_finite
 
 _DATE = (1980, 1, 1, 0, 0, 0)  # of all entries, so that the same mesh gives the same file
 _GREY = "#808080FF"
@@ -68,8 +68,12 @@ def _properties(mesh: Mesh, textures: Textured | None, losses: Losses) -> tuple[
     materials, n_faces = mesh.regions.get(MATERIAL), mesh.surface.n_faces
     rgba = None if colours is None or materials is not None else _rgba(colours)
     held = [*([] if rgba is None else [COLOUR]), *([] if textures is None else [UV])]
-    losses.add("point data", *(name for name in mesh.point_data if name not in held))
-    losses.add("corner data", *(name for name in mesh.corner_data if name not in held))
+    for what, where, data in (("point data", "points", mesh.point_data), ("corner data", "corners", mesh.corner_data)):
+        losses.add(what, *(name for name in data if name not in held))
+        for name in (name for name in (COLOUR, UV) if name in data and name not in held):
+            rows = data[name].reshape(-1, data[name].shape[-1])
+            if rows.dtype.kind == "f" and (reason := share_not_finite(rows, where)):
+                losses.because(what, name, reason)
     if materials is not None:
         group, attributes = _materials(mesh, materials, losses)
     elif rgba is not None:

@@ -11,6 +11,7 @@ import numpy.typing as npt
 
 from anisomesh.io.carried import Array, Carried
 from anisomesh.io.cells import SurfaceCells
+from anisomesh.io.formats.region_names import also_named
 from anisomesh.io.formats.vtk.cells import add_vtk_cells, add_vtk_lines
 from anisomesh.io.formats.vtk.data import ORIGINAL_POINT, DataOfPieces, names_by_meaning, names_of_regions
 from anisomesh.io.polygons import Integers, PolygonSoup
@@ -103,6 +104,8 @@ class Pieces:
         """Return everything, with field data by name."""
         carried = self.carried
         names = names_of_regions(fields, carried)
+        for name, texts in (pair for of in names for pair in of.items()):
+            also_named(carried, name, texts.values())
         for name, values in self._point_data.all(carried).items():
             carried.point_data[self._ours.get(name, name)] = values
         for name, values in self._cell_data.all(carried).items():
