@@ -231,6 +231,27 @@ def test_a_missing_folder_of_an_input_is_named(refuse, torus_obj, words):
     assert "does not exist" not in told("./file")
 
 
+@pytest.mark.parametrize(
+    ("words", "first", "second"),
+    [
+        (("evaluate", "a.ply", "b.ply"), "a.ply", "b.ply"),
+        (("remesh", "a.ply", "-n", 100, "-o", "o.ply", "--density", "b.txt"), "a.ply", "b.txt"),
+        (("remesh", "a.ply", "-o", "o.ply", "--metric-file", "b.sol:1"), "a.ply", "b.sol"),
+        (("remesh", "a.ply", "-n", 100, "-o", "o.ply", "--adapt-to", "b.vtu:p"), "a.ply", "b.vtu"),
+        (("remesh", "MESH", "-o", "o.ply", "--metric-file", "a.npy", "--features", "b.txt"), "a.npy", "b.txt"),
+        (("figure", "result", "a.ply", "b.ply", "-o", "o.png"), "a.ply", "b.ply"),
+        (("figure", "gallery", "MESH", "a.ply", "b.ply", "-o", "o.png"), "a.ply", "b.ply"),
+        (("batch", "-n", 100, "-o", "out", "a.ply", "MESH", "b.ply"), "a.ply", "b.ply"),
+        (("batch", "-n", 100, "-o", "out", "--manifest", "a.csv", "b.ply"), "a.csv", "b.ply"),
+    ],
+)
+def test_of_several_missing_files_all_are_named(refuse, torus_obj, tmp_path, words, first, second):
+    """Regression: the one that is read first was named, which was not the first one given."""
+    line = refuse(1, *(torus_obj if word == "MESH" else word for word in words))
+    assert line == f"anisomesh: error: {first}: no such file; {second}: no such file"
+    assert list(tmp_path.iterdir()) == []
+
+
 def test_files_of_another_number_of_vertices_are_refused_with_both_numbers(refuse, torus_obj, tmp_path):
     n = sum(line.startswith("v ") for line in torus_obj.read_text().splitlines())
     (tmp_path / "few.txt").write_text("1.0\n" * (n - 1))

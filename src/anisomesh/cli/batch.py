@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import glob
 import importlib.util
 import re
 import time
@@ -24,6 +25,7 @@ from anisomesh.cli.arguments import (
     takes_remesh_options,
     target_option,
 )
+from anisomesh.cli.inputs import check_present
 from anisomesh.cli.job import check_format
 from anisomesh.cli.progress import Display, announce_compilation, progress
 from anisomesh.cli.ratios import shares
@@ -36,6 +38,7 @@ from anisomesh.cli.remeshing.shared_options import (
     NormOfAdaption,
     Ratios,
 )
+from anisomesh.cli.spelling import as_options
 from anisomesh.options import MAX_THREADS
 
 if TYPE_CHECKING:
@@ -140,6 +143,7 @@ def _jobs(
     from anisomesh.batch.inputs import jobs_of
     from anisomesh.batch.manifest import read_manifest
     from anisomesh.batch.options import TARGETS
+    from anisomesh.batch.places import is_address
 
     if not sources and manifest is None:
         raise typer.BadParameter("name meshes, folders or patterns, or a --manifest")
@@ -147,6 +151,7 @@ def _jobs(
         raise typer.BadParameter(
             "give one of -n (number of vertices), --ratio, --ratios, --max-error and --edge-length, or --metric-file"
         )
+    check_present(manifest, *(Path(name) for name in sources if not is_address(name) and not glob.has_magic(name)))
     listed = [] if manifest is None else read_manifest(manifest, options, output_format=output_format)
     return [*listed, *jobs_of(sources, options, output_format=output_format, without=out)]
 
@@ -216,6 +221,6 @@ def _show(display: Display, step: Progress) -> None:
 
     row = step.row
     if row["status"] != "done":
-        display.note(f"{row['status']}: {row['output']}: {' '.join(row['error'].split())}")
+        display.note(f"{row['status']}: {row['output']}: {as_options(' '.join(row['error'].split()))}")
     left = f"{step.seconds_left / 60:.0f} min left" if step.seconds_left >= 60 else f"{step.seconds_left:.0f} s left"
     display(StepInfo(stage="batch", iteration=step.number, total=step.total, message=left))

@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
+from anisomesh.cli.inputs import check_present
 from anisomesh.cli.job import read
 from anisomesh.cli.progress import announce_compilation, progress
 from anisomesh.cli.report import as_json, counted, describe_validity, table
@@ -31,6 +32,7 @@ def command(
     """Measure distance, triangle quality, features and validity of RESULT against REFERENCE."""
     from anisomesh.evaluation.report import evaluate
 
+    check_present(reference, result)
     with progress(json_) as display:
         a, b = read(reference)[0], read(result)[0]
         announce_compilation(display, "evaluate")

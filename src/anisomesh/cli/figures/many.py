@@ -18,6 +18,7 @@ from anisomesh.cli.figures.options import (
     picture_options,
     size,
 )
+from anisomesh.cli.inputs import check_present
 from anisomesh.cli.job import read, run_remesh
 from anisomesh.cli.progress import progress
 from anisomesh.cli.ratios import shares
@@ -48,6 +49,7 @@ def gallery(
 
     view = picture_options(direction, up, scale)
     check_figure_path(out, *sources)
+    check_present(*sources)
     with progress(quiet) as display:
         surfaces = [read(source)[0] for source in sources]
         panels = [

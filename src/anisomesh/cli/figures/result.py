@@ -18,6 +18,7 @@ from anisomesh.cli.figures.options import (
     picture_options,
     size,
 )
+from anisomesh.cli.inputs import check_present
 from anisomesh.cli.job import read, run_remesh
 from anisomesh.cli.progress import Display, progress
 from anisomesh.cli.spelling import warning_rows
@@ -61,6 +62,7 @@ def command(
     _check_choice(remeshed, cells, n_vertices, ratio)
     view = picture_options(direction, up, scale)
     check_figure_path(out, source, remeshed)
+    check_present(source, remeshed)
     with progress(quiet) as display:
         if remeshed is None:
             options |= {"n_vertices": n_vertices, "ratio": ratio}

@@ -19,10 +19,18 @@ from anisomesh.cli.arguments import (
     takes_remesh_options,
     target_option,
 )
-from anisomesh.cli.job import STANDARD_STREAM, Outputs, check_input_format, default_output, read_mesh, run_remesh
+from anisomesh.cli.inputs import check_present
+from anisomesh.cli.job import (
+    STANDARD_STREAM,
+    Outputs,
+    check_input_format,
+    default_output,
+    read_mesh,
+    run_remesh,
+)
 from anisomesh.cli.progress import progress
 from anisomesh.cli.remeshing.levels import LevelOutputs, levels_summary, run_levels, targets_of
-from anisomesh.cli.remeshing.prescribed_metric import check_limits, file_of, prescribed_metric
+from anisomesh.cli.remeshing.prescribed_metric import check_limits, file_named, file_of, prescribed_metric
 from anisomesh.cli.remeshing.shared_options import (
     AdaptedTo,
     Gradation,
@@ -155,6 +163,7 @@ def command(
             "give one of -n (number of vertices), --ratio, --ratios, --max-error and --edge-length, or --metric-file"
         )
     target, n_levels = targets_of(n_vertices, ratio, ratios)
+    check_present(source, file_named(metric_file, adapt_to), features, density, keep_points)
     prescribed = prescribed_metric(context, metric_file, adapt_to, norm, edge_length=edge_length, max_error=max_error)
     limits = {"--min-size": min_size, "--max-size": max_size, "--gradation": gradation}
     check_limits(prescribed, [option for option, value in limits.items() if value is not None])

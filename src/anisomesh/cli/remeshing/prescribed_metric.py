@@ -70,6 +70,16 @@ def check_limits(prescribed: MetricFile | AdaptTo | None, options: list[str]) ->
         raise typer.BadParameter(f"{names}: only sizes can be limited; give a --metric-file with lengths of edges")
 
 
+def file_named(metric_file: str | None, adapt_to: str | None) -> Path | None:
+    """Return the file that ``--metric-file`` or ``--adapt-to`` names, None for none."""
+    from anisomesh.io.fields.load import split_spec
+
+    if metric_file is not None:
+        return split_spec(metric_file)[0]
+    path, field = (None, None) if adapt_to is None else split_spec(adapt_to)
+    return None if field is None else path
+
+
 def file_of(prescribed: MetricFile | AdaptTo | None) -> Path | None:
     """Return the file that a metric is read from, None for none."""
     return None if prescribed is None else prescribed.file
