@@ -8,6 +8,9 @@ from numbers import Integral, Real
 
 from anisomesh.errors import OptionError
 
+LARGEST_SIZE = 1e30
+"""Bound of lengths of edges, and inverse of the smallest, so that metrics are far from overflow."""
+
 _LARGEST_INTEGER = 2**63 - 1
 
 

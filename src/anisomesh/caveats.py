@@ -86,6 +86,7 @@ def lengths_beyond(surface: Surface, options: RemeshOptions, max_error: float | 
         lengths["edge_length"] = options.edge_length
         if sizes is not None and not callable(sizes):
             lengths["size_field"] = float(np.min(np.asarray(sizes)))
+        lengths["min_size"] = options.min_size
     for name, length in lengths.items():
         if length is not None and length > surface.diagonal:
             yield (

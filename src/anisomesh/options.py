@@ -8,7 +8,7 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass, fields, replace
 from typing import TYPE_CHECKING, Any, Literal, get_args
 
-from anisomesh._values import real_number, whole_number
+from anisomesh._values import LARGEST_SIZE, real_number, whole_number
 from anisomesh.errors import OptionError
 from anisomesh.metric.names import METRIC_NAMES, MetricName
 from anisomesh.toml import hint
@@ -201,6 +201,9 @@ class RemeshOptions:
             value = getattr(self, name)
             if value is not None and not (math.isfinite(value) and value > 0.0):
                 raise OptionError(f"{name} = {value}; expected a positive finite number")
+            if value is not None and name != "gradation" and not 1.0 / LARGEST_SIZE < value < LARGEST_SIZE:
+                limits = f"{1.0 / LARGEST_SIZE:g} to {LARGEST_SIZE:g}"
+                raise OptionError(f"{name} = {value:g}; expected a length that fits the mesh, from {limits}")
         if (self.edge_length is not None or self.size_field is not None) and self.density is not None:
             raise OptionError(
                 "a density and an edge_length or size_field both say how large triangles are; leave one out"

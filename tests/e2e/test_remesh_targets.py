@@ -77,6 +77,40 @@ def test_an_error_out_of_reach_is_refused():
         anisomesh.remesh(rough.with_points(rough.points * [1.0, 1.0, 0.7]), max_error=1e-9, max_iterations=2, fit=False)
 
 
+ABSURD = {
+    "edge": ({"edge_length": 1e-9}, "edge_length = 1e-09 takes about 4.6e+18 vertices"),
+    "sizes": ({"size_field": np.full(42, 1e-9)}, "size_field, which is 1e-09 at least, takes about 4.6e+18"),
+    "function": ({"size_field": lambda points: np.full(len(points), 1e-9)}, "size_field takes about 4.6e+18 vertices"),
+    "limit": ({"size_field": np.ones(42), "max_size": 1e-9}, "max_size = 1e-09 takes about 4.6e+18 vertices"),
+    "tensors": ({"metric": np.tile(1e18 * np.eye(3), (42, 1, 1))}, "metric takes about 4.6e+18 vertices"),
+    "large limit": ({"size_field": np.ones(42), "min_size": 1e9}, "min_size = 1e+09; expected lengths that fit"),
+}
+
+
+@pytest.mark.parametrize("kind", ABSURD)
+def test_an_absurd_length_is_refused_by_its_option_and_with_the_size_of_the_mesh(kind):
+    """Regression: the message was about 4,611,686,018,427,387,904 vertices and their memory only."""
+    options, said = ABSURD[kind]
+    with pytest.raises(OptionError) as error:
+        anisomesh.remesh(sphere(1), **{"metric": "uniform", **options})
+    assert said in str(error.value)
+    assert f"whose bounding-box diagonal is {sphere(1).diagonal:.4g}" in str(error.value)
+
+
+@pytest.mark.parametrize("name", ["edge_length", "min_size", "max_size"])
+@pytest.mark.parametrize("value", [1e-300, 1e300])
+def test_lengths_beyond_all_meshes_are_refused(name, value):
+    """Regression: they ended in an OverflowError."""
+    more = {} if name == "edge_length" else {"size_field": np.ones(42)}
+    with pytest.raises(OptionError, match=rf"^{name} = 1e.*; expected a length that fits the mesh, from 1e-30"):
+        anisomesh.remesh(sphere(1), metric="uniform", **{name: value}, **more)
+
+
+def test_a_smallest_size_larger_than_the_mesh_is_named():
+    result = anisomesh.remesh(sphere(1), metric="uniform", size_field=np.ones(42), min_size=9.0, max_iterations=1)
+    assert any(text.startswith("min_size 9 is larger than the whole mesh") for text in result.warnings)
+
+
 @pytest.mark.parametrize("wrong", [0.0, -1.0, float("nan"), float("inf")])
 def test_errors_that_are_not_positive_lengths_are_refused(wrong):
     with pytest.raises(OptionError, match="positive length"):

@@ -89,7 +89,8 @@ def smallest_within(
         return replace(found, warnings=(*found.warnings, _ENDED))
     if n not in results:
         raise OptionError(
-            f"max_error = {max_error:g} is not reached: with {n:,} vertices the distance is {error:g}; allow more"
+            f"max_error = {max_error:g} is not reached: with {n:,} vertices the distance is {error:g}, "
+            f"on a mesh whose bounding-box diagonal is {surface.diagonal:.4g}; allow more"
         )
     result = results[n]
     if deadline.passed():

@@ -8,10 +8,9 @@ from scipy import sparse
 from scipy.sparse.csgraph import dijkstra
 
 from anisomesh._arrays import Points, PointScalars, PointTensors
+from anisomesh._values import LARGEST_SIZE
 from anisomesh.errors import OptionError
 from anisomesh.mesh.surface import Surface
-
-_LARGEST_SIZE = 1e30  # and inverse of the smallest, so that metrics are far from overflow
 
 
 def checked_sizes(sizes: PointScalars, points: Points, numbers: npt.NDArray[np.integer] | None = None) -> PointScalars:
@@ -31,7 +30,7 @@ def checked_sizes(sizes: PointScalars, points: Points, numbers: npt.NDArray[np.i
     OptionError
         If some are not positive and finite; says how many, and which is the first and where.
     """
-    invalid = np.flatnonzero(~((sizes > 1.0 / _LARGEST_SIZE) & (sizes < _LARGEST_SIZE)))
+    invalid = np.flatnonzero(~((sizes > 1.0 / LARGEST_SIZE) & (sizes < LARGEST_SIZE)))
     if len(invalid):
         first = invalid[0]
         name = "size_field" if numbers is None else f"size_field[{numbers[first]}]"

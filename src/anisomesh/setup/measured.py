@@ -12,7 +12,7 @@ import numpy as np
 
 from anisomesh._arrays import EdgeMask, Floats, PointMask, real_array
 from anisomesh.errors import OptionError
-from anisomesh.execution.memory import check_memory
+from anisomesh.execution.memory import check_memory, most_vertices
 from anisomesh.execution.run import Run
 from anisomesh.features.detect import WEAK_ANGLE, apexes, sharp_edges
 from anisomesh.features.smooth_lines import with_smooth_lines
@@ -87,6 +87,11 @@ def count_for_length(source: PreparedInput, options: RemeshOptions, run: Run) ->
 
     The metric is measured on a surface that depends on the number, so it is measured again until that hardly changes.
     The outline of the surface has the vertices that it has, and not as many as the length takes.
+
+    Raises
+    ------
+    OptionError
+        If no machine like this one has the memory for so many.
     """
     n, length = _FIRST_COUNT, float(options.absolute_length or 1.0)
     for _ in range(_COUNT_ROUNDS):
@@ -94,9 +99,26 @@ def count_for_length(source: PreparedInput, options: RemeshOptions, run: Run) ->
         extent = MetricExtent.of(measured.working, measured.field)
         asked = length / unit_of_lengths(options, measured.frame)
         before, n = n, max(MIN_VERTICES, extent.count(asked) + _more_on_outline(measured, asked))
+        if n > most_vertices():
+            raise OptionError(
+                f"{_wanted(options)} takes about {n:.2g} vertices on this mesh, whose bounding-box diagonal is "
+                f"{measured.frame.scale:.4g}; this machine has memory for {most_vertices():.2g}: ask for longer edges"
+            )
         if abs(n - before) <= _COUNT_TOLERANCE * n:
             break
     return n
+
+
+def _wanted(options: RemeshOptions) -> str:
+    """Return the option that says how long edges are."""
+    if options.edge_length is not None:
+        return f"edge_length = {options.edge_length:g}"
+    if options.size_field is None:
+        return "metric"
+    if options.max_size is not None and (callable(options.size_field) or options.max_size < np.min(options.size_field)):
+        return f"max_size = {options.max_size:g}"
+    smallest = "" if callable(options.size_field) else f", which is {np.min(options.size_field):g} at least,"
+    return f"size_field{smallest}"
 
 
 def _more_on_outline(measured: Measured, length: float) -> int:
@@ -235,9 +257,11 @@ def _prescribed(source: PreparedInput, surface: Surface, frame: Frame, options: 
         low, high = (None if bound is None else bound / frame.scale for bound in (options.min_size, options.max_size))
         sizes = limited_sizes(working, sizes / frame.scale, low=low, high=high, gradation=options.gradation)
         if sizes.min() > _MAX_SMALLEST_SIZE:
+            raised = low is not None and sizes.min() <= low
+            told = f"size_field is at least {sizes.min() * frame.scale:g} everywhere"
             raise OptionError(
-                f"size_field is at least {sizes.min() * frame.scale:g} everywhere; expected lengths that fit the mesh, "
-                f"whose bounding-box diagonal is {frame.scale:.4g}"
+                f"{f'min_size = {options.min_size:g}' if raised else told}; expected lengths that fit the mesh, whose "
+                f"bounding-box diagonal is {frame.scale:.4g}"
             )
         return MetricField(tensors=metric_of_sizes(sizes))
 
