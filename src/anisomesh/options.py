@@ -115,14 +115,14 @@ class RemeshOptions:
     lock
         Regions of the input whose points and triangles stay as they are, while the rest is remeshed up to them: the
         name or label of a region of the :class:`~anisomesh.attributes.model.Mesh`, several of these, or a mask of the
-        faces (F,).
+        faces (F,). Fixed faces of the mesh are locked too.
     regions
         Whether edges of the result follow the borders between regions of a :class:`~anisomesh.attributes.model.Mesh`
         and the seams of its corner data, also where the surface is smooth, and has vertices at the ends of regions of
         its features.
     attributes
-        Whether the result has everything that a :class:`~anisomesh.attributes.model.Mesh` carries. If not, the mesh
-        is taken for a mere surface, but for its features and fixed points.
+        Whether the result has everything that a :class:`~anisomesh.attributes.model.Mesh` carries, and its fixed faces
+        are locked. If not, the mesh is taken for a mere surface, but for its features and fixed points.
     time_limit
         Wall-clock seconds after which the optimisation and the repair of faults end with what they have; the first
         60 % are for the optimisation. What a valid mesh needs is done regardless, so a run may take somewhat longer.

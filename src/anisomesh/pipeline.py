@@ -239,6 +239,7 @@ def _remesh(cut: Cut, n: int, options: RemeshOptions, run: Run, manner: Manner) 
     agreement = _agreement(mesh, tasks, asked) if asked or task.error_weights is not None else None
     rest, reference = (Surface(source.to_model(each.points, frame), each.faces) for each in (mesh, measured.surface))
     surface, validity = cut.checked(rest, reference, made.validity, run.deadline)
+    said = replace(measured.options, lock=cut.locked) if cut.locked.any() else measured.options
     result = RemeshResult(
         surface=surface,
         mesh=Mesh(surface=surface),
@@ -265,7 +266,7 @@ def _remesh(cut: Cut, n: int, options: RemeshOptions, run: Run, manner: Manner) 
             *losses_of_repair(prepared.report, joined=is_joined),
             *cut.remarks,
             *_said_of_mesh(made, tasks),
-            *caveats(n, field.noise, replace(mesh, points=surface.points), validity, optimised, measured.options),
+            *caveats(n, field.noise, replace(mesh, points=surface.points), validity, optimised, said),
             *(() if agreement is None else unfollowed_sizes(agreement)),
         ),
         conformity=agreement,

@@ -249,3 +249,65 @@ def test_the_command_locks_regions_and_keeps_points(run_cli, tmp_path, suffix, d
 def named(mesh, division):
     regions = mesh.regions[division]
     return np.array([regions.names.get(label, "") for label in regions.labels.tolist()])
+
+
+def required_side():
+    """Return a box of which the triangles of the upper side are required."""
+    return Mesh(surface=BOX, fixed_faces=np.flatnonzero(middles(BOX)[:, 2] > 0.4999))
+
+
+def places_of(mesh):
+    """Return the fixed faces of a mesh by their places, which may begin at any corner."""
+    return triangles(mesh.surface, mesh.surface.faces[mesh.fixed_faces])
+
+
+@pytest.mark.parametrize("suffix", [".mesh", ".meshb"])
+def test_required_triangles_of_medit_stay_and_are_required_again(tmp_path, suffix):
+    """Regression: a line said that the section was left out, and the triangles were remeshed."""
+    given = required_side()
+    save(given, tmp_path / f"a{suffix}")
+    mesh = load_mesh(tmp_path / f"a{suffix}")
+    np.testing.assert_array_equal(mesh.fixed_faces, given.fixed_faces)
+    result = anisomesh.remesh(mesh, n_vertices=250, max_iterations=5)
+    mask = np.isin(np.arange(BOX.n_faces), given.fixed_faces)
+    assert_locked(result, BOX, mask, 250)
+    save(result.mesh, tmp_path / f"b{suffix}")
+    read = load_mesh(tmp_path / f"b{suffix}")
+    assert places_of(read) == places_of(given)
+    assert len(read.fixed_faces) == len(given.fixed_faces)
+
+
+def test_fixed_faces_are_free_without_attributes_and_locked_beside_other_regions():
+    given = required_side()
+    other = middles(BOX)[:, 2] < 1e-6 + BOX.points[:, 2].min()
+    both = anisomesh.remesh(given, n_vertices=400, lock=other, max_iterations=2)
+    assert triangles(BOX, BOX.faces[other]) | places_of(given) <= triangles(both.surface, both.surface.faces)
+    assert places_of(both.mesh) == places_of(given)
+    free = anisomesh.remesh(given, n_vertices=60, attributes=False, max_iterations=2)
+    assert free.surface.n_points == 60
+    with pytest.raises(OptionError, match="as required triangles, are locked unless no attributes are carried over"):
+        anisomesh.remesh(given, n_vertices=60, max_iterations=2)
+
+
+def test_a_file_that_requires_all_triangles_fixes_none(tmp_path, caplog):
+    save(Mesh(surface=BOX, fixed_faces=np.arange(BOX.n_faces)), tmp_path / "a.mesh")
+    assert len(load_mesh(tmp_path / "a.mesh").fixed_faces) == 0
+    assert "did not fix faces since it lists every face of its surface" in caplog.text
+
+
+def test_required_quadrilaterals_are_all_their_triangles(tmp_path):
+    points = "0 0 0 0\n1 0 0 0\n1 1 0 0\n0 1 0 0\n2 0 0 0\n2 1 0 0\n"
+    (tmp_path / "a.mesh").write_text(
+        f"MeshVersionFormatted 2\nDimension 3\nVertices\n6\n{points}Quadrilaterals\n1\n1 2 3 4 0\nTriangles\n2\n"
+        "2 5 3 0\n5 6 3 0\nRequiredTriangles\n1\n2\nRequiredQuadrilaterals\n1\n1\nEnd\n"
+    )
+    mesh = load_mesh(tmp_path / "a.mesh")
+    assert {tuple(sorted(face)) for face in mesh.surface.faces[mesh.fixed_faces].tolist()} == (
+        {tuple(sorted(face)) for face in mesh.surface.faces.tolist()} - {(1, 2, 4)}
+    )
+
+
+@pytest.mark.parametrize("suffix", [".obj", ".off", ".ply", ".stl", ".glb", ".3mf", ".vtu", ".vtp", ".msh"])
+def test_formats_without_fixed_faces_name_them(tmp_path, caplog, suffix):
+    save(required_side(), tmp_path / f"a{suffix}")
+    assert "128 fixed face(s)" in caplog.text

@@ -1,4 +1,4 @@
-"""Edges of a mesh along given lines, and points of it at given places."""
+"""Edges of a mesh along given lines, points of it at given places, and faces of it with given corners."""
 
 from __future__ import annotations
 
@@ -11,6 +11,7 @@ from anisomesh.attributes.model import Ints
 from anisomesh.attributes.places import Floats
 from anisomesh.mesh.geometry import unit
 from anisomesh.mesh.surface import Surface
+from anisomesh.mesh.weld import coincident
 
 _MAX_END_DISTANCE = 0.01  # edge lengths of an end of an edge from the lines that it follows; heuristic
 _MAX_MIDDLE_DISTANCE = 0.1  # the same of its middle: chords of curved lines; heuristic
@@ -62,3 +63,15 @@ def _distances(points: Points, lines: Floats) -> tuple[Floats, Ints]:
         np.ascontiguousarray(points), np.ascontiguousarray(lines.reshape(-1, 3)), segments
     )
     return np.sqrt(np.asarray(squares)), np.asarray(line, dtype=np.int64)
+
+
+def same_faces(surface: Surface, faces: Ints, target: Surface) -> Ints:
+    """Return the faces (m,) of a target whose corners are at the places of the corners of some faces (n,)."""
+    if len(faces) == 0:
+        return np.zeros(0, dtype=np.int64)
+    corners = surface.points[surface.faces[faces]].reshape(-1, 3)
+    place = coincident(np.concatenate([corners, target.points]))
+    wanted = np.sort(place[: len(corners)].reshape(-1, 3), axis=1)
+    given = np.sort(place[len(corners) :][target.faces], axis=1)
+    row = np.unique(np.concatenate([wanted, given]), axis=0, return_inverse=True)[1].reshape(-1)
+    return np.flatnonzero(np.isin(row[len(wanted) :], row[: len(wanted)])).astype(np.int64)

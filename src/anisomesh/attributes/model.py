@@ -60,6 +60,8 @@ class Mesh:
         Edges that stay edges, as pairs of points (n, 2).
     fixed_points
         Points at which there stays a point (n,).
+    fixed_faces
+        Faces that stay as they are (n,), such as required triangles of MEDIT.
     feature_regions, fixed_point_regions
         Divisions of the features, and of the fixed points, by name: the physical curves and points of Gmsh, the
         references of edges in MEDIT. The label of edges and points in no region is 0.
@@ -83,6 +85,7 @@ class Mesh:
     regions: Mapping[str, Regions] = field(default_factory=dict)
     features: EdgeEnds = field(default_factory=lambda: np.zeros((0, 2), dtype=np.int64))
     fixed_points: Ints = field(default_factory=lambda: np.zeros(0, dtype=np.int64))
+    fixed_faces: Ints = field(default_factory=lambda: np.zeros(0, dtype=np.int64))
     feature_regions: Mapping[str, Regions] = field(default_factory=dict)
     fixed_point_regions: Mapping[str, Regions] = field(default_factory=dict)
     materials: Mapping[str, Any] = field(default_factory=dict)
@@ -101,6 +104,7 @@ class Mesh:
         object.__setattr__(self, "materials", self._mapping("materials"))
         object.__setattr__(self, "features", _points_of("features", self.features, n_points, 2))
         object.__setattr__(self, "fixed_points", _points_of("fixed_points", self.fixed_points, n_points, 1))
+        object.__setattr__(self, "fixed_faces", _points_of("fixed_faces", self.fixed_faces, n_faces, 1, "face"))
         counts = {
             "regions": n_faces,
             "feature_regions": len(self.features),
@@ -194,19 +198,19 @@ def _whole_numbers(name: str, values: Any) -> Ints:
     return array
 
 
-def _points_of(name: str, values: Any, n_points: int, width: int) -> Ints:
-    """Return points as (n,) or (n, 2) read-only integers, or an error unless they are points of the surface."""
+def _points_of(name: str, values: Any, count: int, width: int, what: str = "point") -> Ints:
+    """Return points or faces as (n,) or (n, 2) read-only integers, or an error unless the surface has them."""
     array = _whole_numbers(name, values)
     if array.size == 0:
         array = np.zeros((0, 2) if width == 2 else (0,), dtype=np.int64)
     if array.shape[1:] != ((2,) if width == 2 else ()) or array.ndim == 0:
-        expected = "(n, 2), two points for each edge" if width == 2 else "(n,), a point each"
+        expected = "(n, 2), two points for each edge" if width == 2 else f"(n,), a {what} each"
         raise MeshError(f"{name} has shape {array.shape}; expected {expected}")
-    wrong = np.flatnonzero((array < 0) | (array >= n_points))
+    wrong = np.flatnonzero((array < 0) | (array >= count))
     if len(wrong):
         raise MeshError(
-            f"{name} has the point {array.ravel()[wrong[0]]}; expected 0 to {n_points - 1} since there are {n_points} "
-            "points"
+            f"{name} has the {what} {array.ravel()[wrong[0]]}; expected 0 to {count - 1} since there are {count} "
+            f"{what}s"
         )
     array.flags.writeable = False
     return array

@@ -8,7 +8,7 @@ import numpy as np
 
 from anisomesh.attributes.blend import Blend, blend_skin, skin_sets
 from anisomesh.attributes.charts import Joints, with_seams_at_corners
-from anisomesh.attributes.lines import transfer_fixed_points, transfer_lines
+from anisomesh.attributes.lines import same_faces, transfer_fixed_points, transfer_lines
 from anisomesh.attributes.located import Located, majority
 from anisomesh.attributes.model import Array, Ints, Mesh, Regions
 from anisomesh.attributes.places import Floats
@@ -51,14 +51,15 @@ def transfer_attributes(source: Mesh, target: Surface) -> Mesh:
       places of its corners are reached by straight walks from one of these within the chart: no value beyond a seam
       has a part in it.
     - *Features* are the edges of the target along the ones of the source, *fixed points* the points of the target at
-      the ones of the source; they are in the regions of the closest of these.
+      the ones of the source; they are in the regions of the closest of these. *Fixed faces* are the faces of the target
+      with the same corners.
     """
     if not isinstance(source, Mesh) or not isinstance(target, Surface):
         raise MeshError(f"expected a Mesh and a Surface, not {type(source).__name__} and {type(target).__name__}")
     own = source.surface
     if np.array_equal(own.points, target.points) and np.array_equal(own.faces, target.faces):
         return replace(source, surface=target)
-    source = _in_order(with_seams_at_corners(source, Joints(own)))
+    given, source = source, _in_order(with_seams_at_corners(source, Joints(own)))
     located = Located(source, target)
     features, line = transfer_lines(own.points[source.features], target)
     fixed_points, place = transfer_fixed_points(own.points[source.fixed_points], target)
@@ -73,6 +74,7 @@ def transfer_attributes(source: Mesh, target: Surface) -> Mesh:
         },
         features=features,
         fixed_points=fixed_points,
+        fixed_faces=same_faces(own, given.fixed_faces, target),
         feature_regions={name: Regions(d.labels[line], d.names) for name, d in source.feature_regions.items()},
         fixed_point_regions={name: Regions(d.labels[place], d.names) for name, d in source.fixed_point_regions.items()},
         materials=source.materials,
@@ -87,6 +89,7 @@ def _in_order(mesh: Mesh) -> Mesh:
         surface=Surface(mesh.surface.points, mesh.surface.faces[order]),
         face_data={name: values[order] for name, values in mesh.face_data.items()},
         corner_data={name: values[order] for name, values in mesh.corner_data.items()},
+        fixed_faces=np.flatnonzero(np.isin(order, mesh.fixed_faces)),
         regions={name: Regions(regions.labels[order], regions.names) for name, regions in mesh.regions.items()},
     )
 

@@ -57,6 +57,7 @@ def as_mesh(soup: PolygonSoup) -> tuple[Mesh, tuple[str, ...], tuple[str, ...]]:
         regions=regions,
         features=features,
         fixed_points=fixed_points,
+        fixed_faces=_fixed_faces(carried, triangles.source),
         feature_regions=feature_regions,
         fixed_point_regions=fixed_point_regions,
         materials=carried.materials,
@@ -156,6 +157,18 @@ def _fixed_points(carried: Carried, surface: Surface) -> tuple[Integers, dict[st
     chosen, divisions = _each_once(carried, carried.fixed_points, marked[rows], rows, np.arange(len(rows)))
     fixed: Integers = marked[rows][chosen]
     return fixed, divisions
+
+
+def _fixed_faces(carried: Carried, source: Integers) -> Integers:
+    """Return the triangles (n,) of cells that are to stay, given the cell of each triangle (F,).
+
+    All triangles of a surface are fixed by mistake and not kept.
+    """
+    faces = np.flatnonzero(np.isin(source, carried.fixed_cells)).astype(np.int64)
+    if len(faces) == len(source):
+        carried.remarks.append("did not fix faces since it lists every face of its surface")
+        return faces[:0]
+    return faces
 
 
 def _each_once(

@@ -98,6 +98,8 @@ class Carried:
         Divisions of the faces or cells of the file by name.
     lines, fixed_points
         Lines and points that a mesh is to keep.
+    fixed_cells
+        Numbers (n,) of faces or cells of the file that are to stay as they are.
     materials
         Whatever belongs to the file as a whole.
     named
@@ -112,6 +114,7 @@ class Carried:
     divisions: dict[str, Division] = field(default_factory=dict)
     lines: Marked = field(default_factory=Marked)
     fixed_points: Marked = field(default_factory=Marked)
+    fixed_cells: Integers = field(default_factory=lambda: np.zeros(0, dtype=np.int64))
     materials: dict[str, Any] = field(default_factory=dict)
     named: dict[str, list[str]] = field(default_factory=dict)
     remarks: list[str] = field(default_factory=list)

@@ -60,7 +60,13 @@ class Losses:
             self.say(f"{len(mesh.features)} feature edge(s)")
         if len(mesh.fixed_points):
             self.say(f"{len(mesh.fixed_points)} fixed point(s)")
+        self.fixed_faces(mesh)
         self.divisions_of_features(mesh)
+
+    def fixed_faces(self, mesh: Mesh) -> None:
+        """Add the fixed faces of a mesh."""
+        if len(mesh.fixed_faces):
+            self.say(f"{len(mesh.fixed_faces)} fixed face(s)")
 
     def divisions_of_features(self, mesh: Mesh) -> None:
         """Add the divisions of the features and fixed points of a mesh."""

@@ -44,9 +44,11 @@ def without_t_junctions(mesh: Mesh, tolerance: float) -> Mesh:
             break
         faces, source = split.faces, source[split.source]
     parts = Surface(surface.points, faces)
+    is_whole = (np.bincount(source, minlength=surface.n_faces) == 1)[source]
     return replace(
         mesh,
         surface=parts,
+        fixed_faces=np.flatnonzero(is_whole & np.isin(source, mesh.fixed_faces)),
         face_data={name: values[source] for name, values in mesh.face_data.items()},
         corner_data={name: _at_corners(name, values, mesh, parts, source) for name, values in mesh.corner_data.items()},
         regions={name: Regions(regions.labels[source], regions.names) for name, regions in mesh.regions.items()},

@@ -27,6 +27,8 @@ from anisomesh.setup.inputs import PreparedInput
 from anisomesh.setup.rest import rest_of
 from anisomesh.setup.selection import selected_faces
 
+_WAY_OUT = "fixed faces of the mesh, as required triangles, are locked unless no attributes are carried over"
+
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Cut:
@@ -50,6 +52,8 @@ class Cut:
         What a user should know, one sentence each.
     weld
         Distance up to which points of the given mesh are the same, in model units.
+    has_fixed_faces
+        Whether fixed faces of the given mesh are among the locked ones.
     """
 
     whole: PreparedInput
@@ -59,11 +63,17 @@ class Cut:
     face_source: Ints
     remarks: tuple[str, ...]
     weld: float
+    has_fixed_faces: bool = False
 
     @property
     def is_all(self) -> bool:
         """Whether all faces are locked."""
         return bool(self.locked.all())
+
+    @property
+    def _way_out(self) -> str:
+        """What unlocks faces that no option has locked."""
+        return f" ({_WAY_OUT})" if self.has_fixed_faces else ""
 
     @cached_property
     def points(self) -> Ints:
@@ -112,7 +122,7 @@ class Cut:
         if n_vertices < self.least:
             raise OptionError(
                 f"{n_vertices:,} vertices are asked for, and the locked regions and points to keep have "
-                f"{self.least:,}; ask for more, or lock less"
+                f"{self.least:,}; ask for more, or lock less{self._way_out}"
             )
         return n_vertices - self.n_more
 
@@ -203,20 +213,29 @@ def cut_locked(whole: PreparedInput, mesh: Mesh, options: RemeshOptions, *, conn
     ------
     OptionError
         If ``lock`` is neither a region nor a mask of the mesh.
+
+    Notes
+    -----
+    Fixed faces of the mesh are locked too, unless its attributes are not looked at.
     """
     chosen = selected_faces("lock", mesh, options.lock)
+    has_fixed_faces = options.attributes and len(mesh.fixed_faces) > 0
+    if has_fixed_faces:
+        chosen = chosen.copy()
+        chosen[mesh.fixed_faces] = True
     surface, weld = whole.prepared.surface, weld_distance(mesh.surface, options.weld_tolerance)
     locked, face_source, lost = np.zeros(surface.n_faces, dtype=bool), np.zeros(0, dtype=np.int64), 0
     if chosen.any():
         locked, face_source = _found(whole, mesh, np.flatnonzero(chosen), weld)
         lost = int(np.count_nonzero(chosen)) - len(np.unique(face_source))
-        if not locked.any():
+        if not locked.any() and options.lock is not None:
             raise OptionError("lock has only faces that the repair of the mesh changes; lock others")
     remarks = (
         [f"{lost:,} of {chosen.sum():,} locked faces were changed by the repair and are not locked"] if lost else []
     )
     if locked.all():
-        remarks.append("all faces are locked: the result is the input")
+        way_out = f"; {_WAY_OUT}" if has_fixed_faces else ""
+        remarks.append(f"all faces are locked: the result is the input{way_out}")
     is_part = locked.any() and not locked.all()
     rest, source = rest_of(whole, locked, connected=connected) if is_part else (whole, np.arange(surface.n_points))
     return Cut(
@@ -227,6 +246,7 @@ def cut_locked(whole: PreparedInput, mesh: Mesh, options: RemeshOptions, *, conn
         face_source=face_source,
         remarks=tuple(remarks),
         weld=weld,
+        has_fixed_faces=has_fixed_faces,
     )
 
 

@@ -35,6 +35,7 @@ def contents(mesh: Mesh, suffix: str) -> dict[str, Any]:
         },
         "edge_regions": _marked(mesh.feature_regions, "edges"),
         "fixed_points": len(mesh.fixed_points),
+        "fixed_faces": len(mesh.fixed_faces),
         "point_regions": _marked(mesh.fixed_point_regions, "points"),
         "materials": sorted(mesh.materials),
     }
@@ -82,6 +83,8 @@ def contents_rows(facts: dict[str, Any]) -> list[tuple[str, str]]:
     rows += _region_rows("prescribed", facts["edge_regions"])
     if facts["fixed_points"]:
         rows.append(("fixed", counted(facts["fixed_points"], "point")))
+    if facts["fixed_faces"]:
+        rows.append(("fixed", counted(facts["fixed_faces"], "face")))
     rows += _region_rows("fixed", facts["point_regions"])
     others = [name for name in facts["materials"] if name != "unit"]
     if others:

@@ -103,6 +103,7 @@ def to_meshio(mesh: Mesh) -> Any:
     }
     losses.add("face data", *(name for name in mesh.face_data if name in labels))
     losses.add("materials", *mesh.materials)
+    losses.fixed_faces(mesh)
     blank = {
         name: [values, *(_blank(values, len(kind.nodes)) for kind in kinds[1:])]
         for name, values in mesh.face_data.items()

@@ -63,6 +63,7 @@ def msh_bytes(mesh: Mesh, losses: Losses) -> bytes:
         if _quotable(name) != name:
             losses.changed(name)
     losses.add("materials", *mesh.materials)
+    losses.fixed_faces(mesh)
     return b"".join(
         [
             b"$MeshFormat\n2.2 1 8\n" + (1).to_bytes(4, "little") + b"\n$EndMeshFormat\n",

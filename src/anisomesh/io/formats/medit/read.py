@@ -28,6 +28,7 @@ _SURFACES: dict[str, tuple[Shape, int]] = {
 _SECOND_ORDER = (6, 9)
 _VOLUMES = ("Tetrahedra", "Hexahedra", "Prisms", "Pyramids")
 _MARKED_EDGES, _MARKED_POINTS = ("Ridges", "RequiredEdges"), ("Corners", "RequiredVertices")
+_MARKED_FACES = {"RequiredTriangles": "Triangles", "RequiredQuadrilaterals": "Quadrilaterals"}
 _USED = ("Vertices", "Edges", "Normals", "NormalAtVertices", *_MARKED_EDGES, *_MARKED_POINTS)
 _WITHOUT_CONTENT = ("End", "MeshVersionFormatted", "Geometry", "AngleOfCornerBound", "BoundingBox")
 
@@ -37,12 +38,14 @@ def read_medit(data: bytes) -> PolygonSoup:
 
     Notes
     -----
-    Ridges, required edges and edges with a reference are features; corners and required vertices are fixed points.
+    Ridges, required edges and edges with a reference are features; corners and required vertices are fixed points, and
+    required triangles and quadrilaterals fixed faces.
     References of vertices are point data, or a division of the fixed points if no other vertices have one.
     """
     dimension, sections, ends = read_sections(data)
     points, cells = [np.zeros((0, 4))], SurfaceCells()
     references, others = [np.zeros(0)], dict[str, Section]()
+    numbers: dict[str, list[Integers]] = {}  # of the cells of each section
     for section in sections:
         name = section.name
         if name == "Vertices":
@@ -50,6 +53,7 @@ def read_medit(data: bytes) -> PolygonSoup:
         elif name in _SURFACES:
             shape, width = _SURFACES[name]
             rows = table(section, 0, width + 1)
+            numbers.setdefault(name, []).append(sum(map(len, references)) + np.arange(len(rows)))
             cells.add(shape, whole(rows[:, :width]) - 1, nodes_on_sides=width in _SECOND_ORDER)
             references.append(rows[:, width])
         elif name.endswith("Ordering") and name.removesuffix("Ordering") in _SURFACES:
@@ -59,7 +63,13 @@ def read_medit(data: bytes) -> PolygonSoup:
         else:
             others[name] = section
     vertices = np.concatenate(points)
+    required = {name: others.pop(name) for name in _MARKED_FACES if name in others}
     carried = _carried(others, np.concatenate(references), vertices[:, SPACE], dimension)
+    for name, section in required.items():
+        with carried.optional(f"the section {name}"):
+            of_section = np.concatenate(numbers.get(_MARKED_FACES[name], [np.zeros(0, dtype=np.int64)]))
+            chosen = of_section[_within(marks(section), len(of_section))]
+            carried.fixed_cells = np.concatenate([carried.fixed_cells, chosen])
     remarks = () if ends else ("it has no End after its sections; check that none is missing",)
     return cells.soup(vertices[:, :SPACE], remarks, carried)
 

@@ -61,6 +61,7 @@ def _sections(mesh: Mesh, losses: Losses) -> list[Rows]:
     return [
         of_reals("Vertices", points, vertices),
         of_integers("Triangles", faces + 1, references),
+        *([of_integers("RequiredTriangles", mesh.fixed_faces + 1)] if len(mesh.fixed_faces) else []),
         *_edges(mesh, losses),
         *_fixed_points(mesh),
         *_normals(normals, losses),

@@ -53,6 +53,7 @@ def obj_bytes(mesh: Mesh, losses: Losses) -> bytes:
     held += [] if _colours(mesh) is None else [COLOUR]
     losses.add("point data", *(name for name in mesh.point_data if name not in held))
     losses.add("materials", *(name for name in mesh.materials if name != "obj"))
+    losses.fixed_faces(mesh)
     losses.add(OF_FIXED_POINTS, *mesh.fixed_point_regions)
     return "".join(lines).encode("utf-8", errors="replace")
 

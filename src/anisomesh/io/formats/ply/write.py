@@ -56,6 +56,7 @@ def ply_bytes(mesh: Mesh, losses: Losses) -> bytes:
     losses.add("materials", *(name for name in mesh.materials if name != "texture_files"))
     if len(mesh.fixed_points):
         losses.say(f"{len(mesh.fixed_points)} fixed point(s)")
+    losses.fixed_faces(mesh)
     losses.add(OF_FIXED_POINTS, *mesh.fixed_point_regions)
     edge = {"vertex1": mesh.features[:, 0].astype(np.int32), "vertex2": mesh.features[:, 1].astype(np.int32)}
     labels = {name: narrowed(division.labels) for name, division in mesh.feature_regions.items()}

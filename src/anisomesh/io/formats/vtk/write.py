@@ -123,6 +123,7 @@ def _data(
     if isinstance(given, Mapping):
         fields |= _storable({name: np.asarray(values) for name, values in given.items()}, "field data", losses)
     losses.add("materials", *(name for name in mesh.materials if name != "field_data"))
+    losses.fixed_faces(mesh)
     return point_data, cell_data, fields
 
 
