@@ -21,6 +21,7 @@ from anisomesh.io.formats.words import BYTE_ORDER_MARK
 from anisomesh.io.holding import Losses
 from anisomesh.io.known_formats import READERS, TEXT_FORMATS, WRITERS, known_suffix
 from anisomesh.io.materials import files as material_files
+from anisomesh.io.materials import from_gltf
 from anisomesh.io.materials.for_gltf import with_gltf_materials
 from anisomesh.mesh.surface import Surface
 
@@ -239,15 +240,20 @@ def file_content(mesh: Mesh, name: str, suffix: str, losses: Losses, *, in_file:
     """
     folder = material_files.folder_of(name) if in_file else Path.cwd()
     mesh = material_files.with_texture_names(mesh, lambda name: material_files.relative_name(name, folder))
+    looks: dict[int, from_gltf.Look] = {}
     if suffix == ".glb":
         mesh = with_gltf_materials([mesh], losses)[0]
+    elif suffix == ".3mf":
+        mesh = from_gltf.with_3mf_materials(mesh, losses)
+    elif suffix == ".obj" and in_file:
+        mesh, looks = from_gltf.with_obj_materials(mesh, losses)
     try:
         content = WRITERS[suffix](mesh, losses)
     except ValueError as error:
         raise MeshFileError(f"{name}: cannot be written: {error}") from error
-    if suffix == ".obj":
+    if suffix == ".obj" and not looks:
         return material_files.write_beside(content, mesh, Path(name) if in_file else None, losses)
-    return content
+    return from_gltf.write_obj_library(looks, Path(name), losses) + content if looks else content
 
 
 def warn_of_losses(name: str, suffix: str, losses: Losses) -> None:

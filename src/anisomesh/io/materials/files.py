@@ -51,16 +51,16 @@ def with_texture_names(mesh: Mesh, rename: Callable[[str], str]) -> Mesh:
     names, gltf = materials.get("texture_files"), materials.get("gltf")
     if isinstance(names, tuple | list):
         materials["texture_files"] = tuple(rename(str(name)) for name in names)
-    if isinstance(gltf, Mapping) and any(_is_file(image) for image in gltf.get("images", ())):
+    if isinstance(gltf, Mapping) and any(is_file_name(image) for image in gltf.get("images", ())):
         images = [
-            {**image, "uri": quote(rename(unquote(image["uri"])))} if _is_file(image) else image
+            {**image, "uri": quote(rename(unquote(image["uri"])))} if is_file_name(image) else image
             for image in gltf["images"]
         ]
         materials["gltf"] = {**gltf, "images": images}
     return replace(mesh, materials=materials)
 
 
-def _is_file(image: Mapping[str, Any]) -> bool:
+def is_file_name(image: Mapping[str, Any]) -> bool:
     """Return whether an image is in a file, not in a view or in the text itself."""
     return isinstance(image.get("uri"), str) and not re.match(r"[a-zA-Z][a-zA-Z+.-]+:", image["uri"])
 
@@ -117,13 +117,17 @@ def write_beside(content: bytes, mesh: Mesh, path: Path | None, losses: Losses) 
         if "text" in given:
             losses.say("the content of material files, since a stream has no folder; it only names them")
     elif str(folder := folder_of(path)) != given.get("folder", ""):
-        target = _free_name(folder, path.stem)
-        text = _MARK + _moved(given["text"], Path(given.get("folder", "")), folder)
-        with atomic_path(target) as temporary:
-            temporary.write_text(text, encoding="utf-8", errors="surrogateescape", newline="")
-        libraries = (target.name,)
+        libraries = (write_library(_moved(given["text"], Path(given.get("folder", "")), folder), path),)
     lines = "".join(f"{LIBRARIES} {name}\n" for name in libraries)
     return lines.encode("utf-8", errors="replace") + content
+
+
+def write_library(text: str, path: Path) -> str:
+    """Write materials to a file with the stem of an OBJ file beside it, and return its name."""
+    target = _free_name(folder_of(path), path.stem)
+    with atomic_path(target) as temporary:
+        temporary.write_text(_MARK + text, encoding="utf-8", errors="surrogateescape", newline="")
+    return target.name
 
 
 def _free_name(folder: Path, stem: str) -> Path:

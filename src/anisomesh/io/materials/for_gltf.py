@@ -17,10 +17,14 @@ from anisomesh.io.formats.threemf.textures import image_kind
 from anisomesh.io.holding import Losses
 from anisomesh.io.materials.files import referred_file
 
+DISPLAYED = "display_colours"
+"""Key of the display colours of 3MF by the labels of base materials."""
+
+WRAPS = {"wrap": 10497, "mirror": 33648, "clamp": 33071, "none": 33071}
+FILTERS = {"linear": 9729, "nearest": 9728}
+"""Codes of glTF for how textures are repeated, and interpolated, by the words of 3MF."""
+
 _OWN = {"gltf", "trimesh"}  # materials that GLB holds as they are
-_DISPLAYED = "display_colours"
-_WRAPS = {"wrap": 10497, "mirror": 33648, "clamp": 33071, "none": 33071}
-_FILTERS = {"linear": 9729, "nearest": 9728}
 
 
 class _Look(NamedTuple):
@@ -69,14 +73,14 @@ def _numbered(mesh: Mesh, keys: list[tuple[str, int]], names: dict[int, str], gl
             labels[mesh.regions[division].labels == label] = k
     divisions = {MATERIAL, *(division for division, _ in keys)}
     regions = {name: regions for name, regions in mesh.regions.items() if name not in divisions}
-    materials = {name: one for name, one in mesh.materials.items() if name not in ("obj", TEXTURES, _DISPLAYED)}
+    materials = {name: one for name, one in mesh.materials.items() if name not in ("obj", TEXTURES, DISPLAYED)}
     return replace(mesh, regions={**regions, MATERIAL: Regions(labels, names)}, materials={**materials, "gltf": gltf})
 
 
 def _looks_of_3mf(mesh: Mesh, losses: Losses) -> _Looks:
     """Return the looks of base materials and textures of a 3MF archive."""
     looks: _Looks = {}
-    for division, key in ((MATERIAL, _DISPLAYED), (TEXTURE, TEXTURES)):
+    for division, key in ((MATERIAL, DISPLAYED), (TEXTURE, TEXTURES)):
         given, regions = mesh.materials.get(key, {}), mesh.regions.get(division)
         if regions is None or not isinstance(given, Mapping) or (division == TEXTURE and not given):
             continue
@@ -156,9 +160,9 @@ def _linear(text: str) -> tuple[float, ...]:
 def _sampler(texture: Mapping[str, Any]) -> tuple[tuple[str, int], ...]:
     """Return the sampler of a texture of 3MF."""
     wraps = (
-        (key, _WRAPS.get(texture.get(name, ""))) for key, name in (("wrapS", "tilestyleu"), ("wrapT", "tilestylev"))
+        (key, WRAPS.get(texture.get(name, ""))) for key, name in (("wrapS", "tilestyleu"), ("wrapT", "tilestylev"))
     )
-    filters = ((key, _FILTERS.get(texture.get("filter", ""))) for key in ("magFilter", "minFilter"))
+    filters = ((key, FILTERS.get(texture.get("filter", ""))) for key in ("magFilter", "minFilter"))
     return tuple((key, code) for key, code in (*wraps, *filters) if code is not None)
 
 

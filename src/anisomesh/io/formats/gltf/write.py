@@ -50,7 +50,7 @@ def glb_bytes(mesh: Mesh, losses: Losses) -> bytes:
     """
     writer = _Writer()
     writer.document["scenes"][0]["nodes"] = _add_mesh(mesh, writer, losses)
-    writer.add_materials(_given_materials(mesh))
+    writer.add_materials(given_materials(mesh))
     return writer.content()
 
 
@@ -72,7 +72,7 @@ def glb_levels_bytes(meshes: Sequence[Mesh], losses: Losses) -> bytes:
         nodes = _add_mesh(mesh, writer, losses if mesh is meshes[0] else Losses())
         heads.append(nodes[0] if len(nodes) == 1 else writer.add_group(nodes))
     writer.document["scenes"][0]["nodes"] = heads[:1]
-    writer.add_materials(_given_materials(meshes[0]))
+    writer.add_materials(given_materials(meshes[0]))
     if len(meshes) > 1:
         finest, counts = writer.document["nodes"][heads[0]], [mesh.surface.n_points for mesh in meshes]
         finest["extensions"] = {LEVELS: {"ids": heads[1:]}}
@@ -92,7 +92,7 @@ def _add_mesh(mesh: Mesh, writer: _Writer, losses: Losses) -> list[int]:
     losses.features(mesh)
     attributes = _attributes(mesh, losses)
     labels = [np.zeros(mesh.surface.n_faces, dtype=np.int64) if d is None else d.labels for d in (nodes, materials)]
-    numbers = _material_numbers(materials, _given_materials(mesh), writer, losses)
+    numbers = _material_numbers(materials, given_materials(mesh), writer, losses)
     primitives: dict[int, list[dict[str, Any]]] = {}
     for (node, material), chosen in by_label(*labels):
         primitive = _primitive(mesh, np.sort(chosen), writer, attributes)
@@ -103,7 +103,7 @@ def _add_mesh(mesh: Mesh, writer: _Writer, losses: Losses) -> list[int]:
     return [writer.add_node(parts, texts.get(node, "")) for node, parts in primitives.items()]
 
 
-def _given_materials(mesh: Mesh) -> dict[str, Any]:
+def given_materials(mesh: Mesh) -> dict[str, Any]:
     """Return the materials of a mesh as glTF has them, empty if it has none."""
     given, theirs = mesh.materials.get("gltf"), mesh.materials.get(TRIMESH)
     if given is None and isinstance(theirs, Mapping):
