@@ -56,6 +56,7 @@ def test_no_file_has_normals_of_length_zero(tmp_path, caplog, suffix, at):
     read = load_mesh(tmp_path / f"a{suffix}")
     if "normal" not in read.point_data.keys() | read.corner_data.keys():
         assert "normal" in said
+        assert suffix in (".stl", ".3mf")
         return
     stored = [data["normal"] for data in (read.point_data, read.corner_data) if "normal" in data]
     assert all((np.linalg.norm(rows, axis=-1) != 0.0).all() for rows in stored)
@@ -63,6 +64,10 @@ def test_no_file_has_normals_of_length_zero(tmp_path, caplog, suffix, at):
     kept = [key for key in before if np.array_equal(before[key], after[key], equal_nan=True)]
     if suffix in HOLDS_NAN:
         assert len(kept) == 6
+    elif suffix in (".glb", ".off"):  # one normal for each point
+        np.testing.assert_array_equal(list(after.values()), [UP] * 6)
+        assert ("1 of 4 points" if at == "points" or suffix == ".off" else "1 of 6 corners") in said
+        assert "have no normal: they get the one of faces" in said
     else:
         assert suffix == ".obj"
         assert "vn 0" not in (tmp_path / "a.obj").read_text().replace("vn 0.0 0.0 1.0", "")

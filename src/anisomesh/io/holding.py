@@ -172,9 +172,30 @@ def share_not_finite(rows: Array, where: str) -> str:
     return f"which are {what} at {np.count_nonzero(lacking):,} of {len(rows):,} {where}"
 
 
-def share_lacking(lacking: npt.NDArray[np.bool_], where: str) -> str:
-    """Return why data are left out that some rows (n,) lack, at points, corners or faces."""
-    return f"which {np.count_nonzero(lacking):,} of {len(lacking):,} {where} lack"
+def with_all_normals(mesh: Mesh, losses: Losses) -> Mesh:
+    """Return a mesh with a normal wherever some are given, for formats that have one everywhere or none.
+
+    The ones that are missing are the ones of the faces; how many points or corners of faces lack one is added to the
+    losses.
+    """
+    surface = mesh.surface
+    for where, data in (("points", mesh.point_data), ("corners", mesh.corner_data)):
+        given = data.get(NORMAL)
+        if given is None or given.dtype.kind != "f" or given.shape[-1] != 3 or given.ndim != 2 + (where == "corners"):
+            continue
+        has = has_direction(given)
+        if has.all() or not has.any():
+            continue
+        at_points = where == "points"
+        computed = surface.point_normals if at_points else np.repeat(surface.face_normals[:, None], 3, axis=1)
+        computed = np.where(has_direction(computed)[..., None], computed, np.array([0.0, 0.0, 1.0]))
+        used = np.isin(np.arange(surface.n_points), surface.faces) if at_points else np.ones_like(has)
+        if (count := np.count_nonzero(used & ~has)) > 0:
+            n_used = np.count_nonzero(used)
+            losses.say(f"that {count:,} of {n_used:,} {where} have no normal: they get the one of faces")
+        filled = {**data, NORMAL: np.where(has[..., None], given, computed.astype(given.dtype))}
+        mesh = replace(mesh, point_data=filled) if at_points else replace(mesh, corner_data=filled)
+    return mesh
 
 
 def continuous_corner_data(mesh: Mesh, losses: Losses) -> dict[str, Array]:

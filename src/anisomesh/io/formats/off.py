@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 import re
+from dataclasses import replace
 
 import numpy as np
 
 from anisomesh.attributes.model import Mesh
 from anisomesh.io.carried import COLOUR, NORMAL, UV, Array, Carried
 from anisomesh.io.formats.words import coordinates, integers
-from anisomesh.io.holding import Losses, continuous_corner_data, has_direction, share_lacking
+from anisomesh.io.holding import Losses, continuous_corner_data, has_direction, with_all_normals
 from anisomesh.io.polygons import PolygonSoup
 
 _BYTE = 255
@@ -93,10 +94,11 @@ def off_bytes(mesh: Mesh, losses: Losses) -> bytes:
     points, faces = mesh.surface.points, mesh.surface.faces
     parts, pattern, head = [points], "%r %r %r", ""
     point_data = {**mesh.point_data, **continuous_corner_data(mesh, losses)}
+    point_data = {**with_all_normals(replace(mesh, point_data=point_data, corner_data={}), losses).point_data}
     for name, letters, widths in ((NORMAL, "N", (3,)), (COLOUR, "C", (3, 4)), (UV, "ST", (2,))):
         columns = _columns(point_data.get(name), widths)
-        if name == NORMAL and columns is not None and not (has := has_direction(columns[0])).all():
-            losses.because("point data", name, share_lacking(~has, "points"))
+        if name == NORMAL and columns is not None and not has_direction(columns[0]).all():
+            losses.because("point data", name, "which have no length")
             del point_data[name]
         elif columns is not None:
             parts.append(columns[0])

@@ -10,7 +10,7 @@ import numpy.typing as npt
 
 from anisomesh.io.carried import COLOUR, NORMAL, UV, Array, Carried
 from anisomesh.io.formats.gltf.document import COMPONENTS, WIDTHS, Document, as_numbers
-from anisomesh.io.holding import has_direction, share_lacking, share_not_finite
+from anisomesh.io.holding import has_direction, share_not_finite
 from anisomesh.mesh.geometry import unit
 
 TANGENT = "tangent"
@@ -124,8 +124,8 @@ def encoded(name: str, values: Array, where: str = "points") -> Encoded | str:
         return f"which have {rows.shape[1]} components"
     if reason := share_not_finite(rows, where):
         return reason
-    if name == NORMAL and rows.shape[1] == 3 and not (has := has_direction(rows)).all():
-        return share_lacking(~has, where)
+    if name == NORMAL and rows.shape[1] == 3 and not has_direction(rows).all():
+        return "which have no length"
     width, kind = rows.shape[1], rows.dtype.str[1:]
     numbered = _SET.fullmatch(name)
     if numbered and numbered[1] == UV and width == 2:

@@ -15,7 +15,7 @@ from anisomesh.io.formats.gltf.document import BINARY_CHUNK, COMPONENTS, JSON_CH
 from anisomesh.io.formats.gltf.materials import write_materials
 from anisomesh.io.formats.gltf.read import LEVELS, MATERIAL, NO_MATERIAL, NODE, TRIANGLES
 from anisomesh.io.formats.region_names import region_texts
-from anisomesh.io.holding import Losses, by_label, distinct_corners, main_division
+from anisomesh.io.holding import Losses, by_label, distinct_corners, main_division, with_all_normals
 from anisomesh.io.objects.trimesh_scenes import TRIMESH, materials_as_gltf
 
 _COVERAGE = "MSFT_screencoverage"  # least share of the screen for each level
@@ -90,6 +90,7 @@ def _add_mesh(mesh: Mesh, writer: _Writer, losses: Losses) -> list[int]:
     held = ("gltf", TRIMESH) if isinstance(mesh.materials.get(TRIMESH), Mapping) else ("gltf",)
     losses.add("materials", *(name for name in mesh.materials if name not in held))
     losses.features(mesh)
+    mesh = with_all_normals(mesh, losses)
     attributes = _attributes(mesh, losses)
     labels = [np.zeros(mesh.surface.n_faces, dtype=np.int64) if d is None else d.labels for d in (nodes, materials)]
     numbers = _material_numbers(materials, given_materials(mesh), writer, losses)
