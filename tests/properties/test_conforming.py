@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 from junction_shapes import square
 
-from anisomesh.conforming.boundary_places import boundary_places
 from anisomesh.conforming.chains import Bundle, Chain, conform
+from anisomesh.mesh.boundary_places import boundary_places
 from anisomesh.mesh.surface import Surface
 from anisomesh.mesh.topology import boundary_loops, euler_characteristic
 

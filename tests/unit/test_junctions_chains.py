@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 from junction_shapes import square
 
-from anisomesh.conforming.boundary_places import LoopPlaces
 from anisomesh.junctions.chains import _Chained
+from anisomesh.mesh.boundary_places import LoopPlaces
 from anisomesh.mesh.surface import Surface
 
 

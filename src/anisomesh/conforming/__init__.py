@@ -1,1 +1,1 @@
-"""Boundaries of a mesh that are found along the ones of its reference, and given the same vertices."""
+"""Boundaries of a mesh that are given the same vertices."""

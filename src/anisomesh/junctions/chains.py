@@ -9,10 +9,10 @@ import numpy as np
 import numpy.typing as npt
 
 from anisomesh._arrays import Faces, Points
-from anisomesh.conforming.boundary_places import LoopPlaces, boundary_places
 from anisomesh.conforming.chains import Bundle, Chain, with_split_sides
 from anisomesh.junctions.cut import Junctions
 from anisomesh.junctions.graph import Loop
+from anisomesh.mesh.boundary_places import LoopPlaces, boundary_places
 from anisomesh.mesh.surface import Surface
 
 Ints = npt.NDArray[np.int64]

@@ -1,23 +1,20 @@
-"""Where the boundary of a mesh is on the boundary of the surface that it approximates."""
+"""The points of the boundary of a mesh in order with the anchors on the boundary of the surface."""
 
 from __future__ import annotations
 
-from collections import defaultdict
 from collections.abc import Iterator
 from dataclasses import dataclass
 
-import igl
 import numpy as np
 import numpy.typing as npt
 
 from anisomesh._arrays import Points
+from anisomesh.mesh.boundary_places import LoopPlaces, boundary_places
 from anisomesh.mesh.surface import Surface
 from anisomesh.mesh.topology import boundary_loops, edge_keys
 from anisomesh.meshops.anchors import Anchors, places_found
 from anisomesh.meshops.change import Floats, Ints
 from anisomesh.meshops.held import at_places
-
-_BACKWARDS = 0.75  # of a loop ahead, from which on a point counts as behind the one before
 
 Mask = npt.NDArray[np.bool_]
 
@@ -61,65 +58,46 @@ class SurfaceBoundary:
     """The boundary loops of a surface, with the anchors on them."""
 
     def __init__(self, surface: Surface, anchors: Anchors) -> None:
-        loops = boundary_loops(surface.faces)
-        self.anchors = anchors
-        self.point = np.concatenate([np.zeros(0, dtype=np.int32), *loops]).astype(np.int64)
-        self.loop = np.repeat(np.arange(len(loops)), [len(loop) for loop in loops])
-        self.first = np.concatenate([[0], np.cumsum([len(loop) for loop in loops])]).astype(np.int64)
-        self.places = surface.points[self.point]
-        ahead = np.arange(1, len(self.point) + 1)
-        if len(loops):
-            ahead[self.first[1:] - 1] = self.first[:-1]
-        self.ahead = ahead
-        length = np.linalg.norm(self.places[ahead] - self.places, axis=1) if len(loops) else np.zeros(0)
-        self.arc = np.concatenate([[0.0], np.cumsum(length)])
-        self.anchored = at_places(self.places, anchors.places)
+        self._surface, self._anchors = surface, anchors
+        self._loops = [loop.astype(np.int64) for loop in boundary_loops(surface.faces)]
         outline = edge_keys(places_found(anchors.places, surface.points)[anchors.outline])
-        ends = np.stack([self.point, self.point[ahead]], axis=1) if len(loops) else np.zeros((0, 2), dtype=np.int64)
-        self.outlined = np.isin(edge_keys(ends), outline)
+        self._anchored = [at_places(surface.points[loop], anchors.places) for loop in self._loops]
+        self._outlined = [
+            np.isin(edge_keys(np.stack([loop, np.roll(loop, -1)], axis=1)), outline) for loop in self._loops
+        ]
 
     def stops(self, mesh: Surface) -> Iterator[Stops]:
-        """Yield the stops along each boundary loop of a mesh that belongs to a loop with anchors."""
-        loops = boundary_loops(mesh.faces)
-        if len(loops) == 0 or not self.anchored.any():
+        """Yield the stops along each boundary loop of a mesh that belongs to a loop with anchors.
+
+        There are none if the loops of the mesh are not the ones of the surface.
+        """
+        if not any(anchored.any() for anchored in self._anchored):
             return
-        taken: dict[int, int] = defaultdict(int)
-        for loop in loops:
-            segment, arc = self._located(mesh.points[loop])
-            own = int(np.bincount(self.loop[segment]).argmax())
-            taken[own] += 1
-            if self.anchored[self.loop == own].any() and taken[own] == 1:
-                yield self._merged(own, loop.astype(np.int64), mesh.points[loop], arc)
+        placed = boundary_places(mesh, self._surface, self._loops)
+        for number, loop in enumerate(placed or []):
+            if self._anchored[number].any():
+                yield self._merged(number, loop, mesh.points[loop.points])
 
-    def _located(self, points: Points) -> tuple[Ints, Floats]:
-        """Return the segment (n,) nearest to each point and its arc length (n,)."""
-        segments = np.stack([np.arange(len(self.point)), self.ahead], axis=1)
-        _, segment, closest = igl.point_mesh_squared_distance(np.ascontiguousarray(points), self.places, segments)
-        segment = np.asarray(segment, dtype=np.int64)
-        arc = self.arc[segment] + np.linalg.norm(closest - self.places[segment], axis=1)
-        vertex = places_found(points, self.places)
-        return np.where(vertex >= 0, vertex, segment), np.where(vertex >= 0, self.arc[vertex], arc)
-
-    def _merged(self, own: int, loop: Ints, points: Points, arc: Floats) -> Stops:
-        """Return the stops of one loop: points of the mesh (n,) at arc lengths (n,), and missing anchors."""
-        first, last = self.first[own], self.first[own + 1]
-        length = self.arc[last] - self.arc[first]
-        steps = np.mod(np.diff(arc), length)
-        steps[steps > _BACKWARDS * length] = 0.0
-        along = np.minimum(np.concatenate([[0.0], np.cumsum(steps)]), length)
-        members = np.arange(first, last)[self.anchored[first:last]]
-        members = members[~at_places(self.places[members], points)]
-        offset = np.mod(self.arc[members] - arc[0], length)
-        order = np.argsort(np.concatenate([along, offset]), kind="stable")
-        place = np.concatenate([points, self.places[members]])[order]
-        anchored = at_places(place, self.anchors.places)
-        last_anchor = np.maximum.accumulate(np.where(anchored, np.arange(len(place)), -1))
+    def _merged(self, number: int, loop: LoopPlaces, points: Points) -> Stops:
+        """Return the stops of one loop: points of the mesh (n, 3) and missing anchors."""
+        own, anchored = self._surface.points[self._loops[number]], self._anchored[number]
+        start = np.concatenate([[0.0], np.cumsum(np.linalg.norm(np.roll(own, -1, axis=0) - own, axis=1))])
+        length = start[-1]
+        vertex = places_found(points, own)
+        arc = np.maximum.accumulate(np.where(vertex >= 0, start[vertex], loop.places))
+        missing = np.flatnonzero(anchored)
+        missing = missing[~at_places(own[missing], points)]
+        along = np.concatenate([arc - arc[0], np.mod(start[missing] - arc[0], length)])
+        order = np.argsort(along, kind="stable")
+        place = np.concatenate([points, own[missing]])[order]
+        is_anchor = at_places(place, self._anchors.places)
+        last_anchor = np.maximum.accumulate(np.where(is_anchor, np.arange(len(place)), -1))
         last_anchor = np.where(last_anchor >= 0, last_anchor, last_anchor[-1])  # before the first: around the loop
-        segment = places_found(place, self.places)[last_anchor]
+        side = places_found(place, own)[last_anchor]
         return Stops(
-            point=np.concatenate([loop, np.full(len(members), -1)])[order],
+            point=np.concatenate([loop.points, np.full(len(missing), -1)])[order],
             places=place,
-            arc=np.append(np.concatenate([along, offset])[order], length),
-            anchored=anchored,
-            outlined=anchored.any() & (segment >= 0) & self.outlined[segment],
+            arc=np.append(along[order], length),
+            anchored=is_anchor,
+            outlined=is_anchor.any() & (side >= 0) & self._outlined[number][side],
         )

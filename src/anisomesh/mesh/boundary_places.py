@@ -10,7 +10,7 @@ import numpy.typing as npt
 from scipy.spatial import cKDTree
 from scipy.spatial.distance import cdist
 
-from anisomesh.conforming.closed_polyline import misfit_of, placed_by_length, placed_on
+from anisomesh.mesh.closed_polyline import misfit_of, placed_by_length, placed_on
 from anisomesh.mesh.geometry import unit
 from anisomesh.mesh.surface import Surface
 from anisomesh.mesh.topology import boundary_loops, half_edges
