@@ -168,7 +168,7 @@ def _is_division(name: str, labels: Array, names: dict[int, str] | None) -> bool
 
 
 def listed(names: Sequence[str]) -> str:
-    """Return some names, and how many more there are, for a remark."""
+    """Return some names, and the number of further ones, for a remark."""
     more = f" and {len(names) - _MAX_NAMES:,} more" if len(names) > _MAX_NAMES else ""
     return ", ".join(names[:_MAX_NAMES]) + more
 

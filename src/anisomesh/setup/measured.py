@@ -91,7 +91,7 @@ def count_for_length(source: PreparedInput, options: RemeshOptions, run: Run) ->
     Raises
     ------
     OptionError
-        If no machine like this one has the memory for so many.
+        If this machine has too little memory for them.
     """
     n, length = _FIRST_COUNT, float(options.absolute_length or 1.0)
     for _ in range(_COUNT_ROUNDS):
