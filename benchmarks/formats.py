@@ -98,6 +98,7 @@ MESHES = {
     ),
     "feature edges": Mesh(surface=SURFACE, features=SURFACE.edges[::7]),
     "fixed points": Mesh(surface=SURFACE, fixed_points=np.arange(0, N_POINTS, 5)),
+    "fixed faces": Mesh(surface=SURFACE, fixed_faces=np.arange(0, N_FACES, 5)),
     "regions of feature edges": marked_edges({}),
     "regions of feature edges with names": marked_edges({3: "inlet", 4: "tip", 5: "outer rim"}),
     "regions of fixed points with names": marked_points({3: "inlet", 5: "outer rim"}),
@@ -188,12 +189,12 @@ def regions_kept(mesh: Mesh, read: Mesh) -> str:
 
 
 def places(mesh: Mesh, points: np.ndarray) -> set[bytes]:
-    """Return the coordinates of points or edges."""
+    """Return the coordinates of points, edges or faces."""
     return {place(mesh, row) for row in points}
 
 
 def place(mesh: Mesh, row: np.ndarray) -> bytes:
-    """Return the coordinates of a point or an edge."""
+    """Return the coordinates of a point, an edge or a face."""
     found = mesh.surface.points.astype(np.float32)[row].reshape(-1, 3)
     return found[np.lexsort(found.T)].tobytes()
 
@@ -211,6 +212,12 @@ def kept(mesh: Mesh, read: Mesh) -> str:
         given, found = getattr(mesh, name), getattr(read, name)
         if len(given):
             results.append(EXACT if places(mesh, given) == places(read, found) else LOST)
+    if len(mesh.fixed_faces):
+        given, found = (
+            places(mesh, mesh.surface.faces[mesh.fixed_faces]),
+            places(read, read.surface.faces[read.fixed_faces]),
+        )
+        results.append(EXACT if given == found else LOST)
     return results[0]
 
 
