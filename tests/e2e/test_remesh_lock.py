@@ -7,6 +7,7 @@ import anisomesh
 from anisomesh import Mesh, Regions, Surface
 from anisomesh.errors import OptionError
 from anisomesh.io.meshes import load_mesh, save
+from anisomesh.mesh.geometry import thickness
 from anisomesh.shapes.analytic import box, open_patch, sphere, torus
 
 BOX, BALL = box((1.0, 0.7, 0.5), n=8), sphere(3)
@@ -176,6 +177,26 @@ def test_what_locked_faces_carry_is_the_same(lock):
 def test_regions_that_do_not_exist_are_refused(lock, message):
     with pytest.raises(OptionError, match=message):
         anisomesh.remesh(carrying(BOX), n_vertices=100, lock=lock)
+
+
+@pytest.mark.parametrize("n_vertices", [160, 180])
+def test_a_curved_border_of_locked_faces_is_not_cut_short(n_vertices):
+    """Regression: the border counted as a crease with cells beside it, past which one edge from end to end was made.
+
+    All border points hung on that edge in slivers, which filled the gap.
+    """
+    x, y = np.meshgrid(np.linspace(0.0, 2.0, 24), np.linspace(0.0, 1.0, 16), indexing="ij")
+    points = np.stack([x, y, 0.15 * np.sin(3.0 * x) * np.cos(2.0 * y)], axis=2).reshape(-1, 3)
+    a = (16 * np.arange(23)[:, None] + np.arange(15)).ravel()
+    squares = np.stack([a, a + 16, a + 17, a + 1], axis=1)
+    sheet = Surface(points, np.concatenate([squares[:, [0, 1, 2]], squares[:, [0, 2, 3]]]))
+    right = middles(sheet)[:, 0] > 1.5
+    mesh = Mesh(surface=sheet, regions={"side": Regions(right.astype(int), {0: "left", 1: "right"})})
+    result = anisomesh.remesh(mesh, n_vertices=n_vertices, lock="right", metric="uniform")
+    free = result.mesh.regions["side"].labels == 0
+    surface = result.surface
+    assert surface.face_areas[free].sum() == pytest.approx(sheet.face_areas[~right].sum(), rel=0.001)
+    assert thickness(surface.points[surface.faces[free]]).min() > 0.03
 
 
 def test_too_few_vertices_are_refused():

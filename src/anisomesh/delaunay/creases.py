@@ -88,7 +88,8 @@ def crease_cells(features: FeatureNetwork, cells: CellComplex, boundary: CellInt
     -----
     A component belongs to the crease of which it has the longest interval, if that is long or the site is near it; a
     component with a corner belongs to all intervals that end there. Edges of the dual follow a crease from one
-    component that belongs to it to the next, unless a component that does not belong to it is in between.
+    component that belongs to it to the next, unless a component that does not belong to it is in between. Where a
+    crease is a part of the boundary all components there belong to it.
     """
     creases, sites = features.creases, cells.diagram.sites
     intervals = crease_intervals(features, cells.diagram)
@@ -99,6 +100,7 @@ def crease_cells(features: FeatureNetwork, cells: CellComplex, boundary: CellInt
     own, corner, place = _anchors(features, cells, intervals, boundary, nearest)
     belongs = ((intervals.corners == corner[component][:, None]) & (intervals.corners >= 0)).any(axis=1)
     belongs |= own[component] == np.arange(len(component))
+    belongs |= _along_boundary(features, intervals, cells) & at_boundary[component]
     runs = _runs(creases.closed, intervals, belongs)
     links = component[np.array([[run[0], run[-1]] for run in runs], dtype=np.int64).reshape(-1, 2)]
     gaps = [run for run in runs if len(run) > 2]
@@ -153,6 +155,13 @@ def _anchors(
     own[at_boundary] = -1
     corner[away] = -1
     return own, corner, place
+
+
+def _along_boundary(features: FeatureNetwork, intervals: CreaseIntervals, cells: CellComplex) -> Mask:
+    """Return which intervals (A,) are on edges of the boundary, as the ones of a border that locked faces left."""
+    creases, surface = features.creases, cells.diagram.embedded.surface
+    segment = creases.segment_at(0.5 * (intervals.start + intervals.end), intervals.polyline)
+    return np.asarray(surface.edge_face_count[creases.edge[segment]] == 1)
 
 
 def _curved(features: FeatureNetwork, intervals: CreaseIntervals, which: Ints, chord: EmbeddedPoints) -> Mask:
