@@ -18,7 +18,7 @@ from anisomesh.io.assemble import as_mesh
 from anisomesh.io.atomic import atomic_path
 from anisomesh.io.convert import from_object
 from anisomesh.io.formats.words import BYTE_ORDER_MARK
-from anisomesh.io.holding import Losses
+from anisomesh.io.holding import Losses, without_unnamed
 from anisomesh.io.known_formats import READERS, TEXT_FORMATS, WRITERS, known_suffix
 from anisomesh.io.materials import files as material_files
 from anisomesh.io.materials import from_gltf
@@ -238,7 +238,7 @@ def file_content(mesh: Mesh, name: str, suffix: str, losses: Losses, *, in_file:
     MeshFileError
         If the format cannot hold the mesh.
     """
-    folder = material_files.folder_of(name) if in_file else Path.cwd()
+    folder, mesh = material_files.folder_of(name) if in_file else Path.cwd(), without_unnamed(mesh, losses)
     mesh = material_files.with_texture_names(mesh, lambda name: material_files.relative_name(name, folder))
     looks: dict[int, from_gltf.Look] = {}
     if suffix == ".glb":

@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-import re
 from collections.abc import Container, Mapping
 from xml.etree.ElementTree import Element
 
 import numpy as np
 
 from anisomesh.io.carried import NORMAL, UV, Array, Carried
+from anisomesh.io.formats.region_names import label_of
 from anisomesh.io.formats.vtk.arrays import ArrayReader
 
 NAMES_OF_REGIONS = "regions of "
@@ -69,7 +69,11 @@ def read_section(piece: Element, section: str, arrays: ArrayReader, count: int, 
     found: dict[str, Array] = {}
     for element in piece.iterfind(f"{section}/*"):
         name = element.get("Name", "")
-        if count and element.tag in _ARRAY_TAGS and name:
+        if not count or element.tag not in _ARRAY_TAGS:
+            continue
+        if not name:
+            carried.remarks.append(f"left out {section} without a name")
+        else:
             with carried.optional(f"{section} {name!r}"):
                 found[name] = _rows(element, arrays, count)
     return found
@@ -89,7 +93,9 @@ def read_field_data(root: Element, kind: str, arrays: ArrayReader, carried: Carr
     found: dict[str, Array] = {}
     for element in root.iterfind(f"{kind}/FieldData/*"):
         name = element.get("Name", "")
-        if element.tag in _ARRAY_TAGS and name:
+        if element.tag in _ARRAY_TAGS and not name:
+            carried.remarks.append("left out FieldData without a name")
+        elif element.tag in _ARRAY_TAGS:
             with carried.optional(f"FieldData {name!r}"):
                 values, width = arrays.read(element), element.get("NumberOfComponents", "1")
                 found[name] = values.reshape((-1, int(width)) if width.isdigit() and int(width) > 1 else (-1,))
@@ -120,11 +126,12 @@ def names_of_regions(fields: dict[str, Array], carried: Carried) -> list[dict[st
 def _labels(text: str) -> dict[int, str]:
     found = {}
     for line in text.split("\n"):
-        match = re.fullmatch(r"(-?\d{1,18})(?: (.*))?", line, re.DOTALL)
-        if match is None:
+        digits, _, name = line.partition(" ")
+        label = label_of(digits)
+        if label is None:
             raise ValueError(f"{line[:40]!r} is not a label and its name")
-        if match[2]:
-            found[int(match[1])] = match[2]
+        if name:
+            found[label] = name
     return found
 
 
