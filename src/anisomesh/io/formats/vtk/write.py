@@ -21,6 +21,7 @@ from anisomesh.io.formats.vtk.data import (
     NAMES_OF_POINT_REGIONS,
     NAMES_OF_REGIONS,
     ORIGINAL_POINT,
+    blank_rows,
 )
 from anisomesh.io.holding import (
     OF_FEATURES,
@@ -150,12 +151,7 @@ def _names(division: Regions, losses: Losses) -> Array:
 
 def _padded(values: Array, order: Sequence[str], counts: Mapping[str, int]) -> Array:
     """Return an array of faces with rows of NaN, 0 or empty strings for lines and vertices."""
-    fill: Any = {"f": np.nan, "U": ""}.get(values.dtype.kind, 0)
-    rows = [
-        values if kind == "faces" else np.full((counts[kind], *values.shape[1:]), fill, dtype=values.dtype)
-        for kind in order
-    ]
-    return np.concatenate(rows)
+    return np.concatenate([values if kind == "faces" else blank_rows(values, counts[kind]) for kind in order])
 
 
 def vtu_bytes(
