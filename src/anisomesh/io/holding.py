@@ -208,7 +208,7 @@ def with_all_normals(mesh: Mesh, losses: Losses) -> Mesh:
         used = np.isin(np.arange(surface.n_points), surface.faces) if at_points else np.ones_like(has)
         if (count := np.count_nonzero(used & ~has)) > 0:
             n_used = np.count_nonzero(used)
-            losses.say(f"that {count:,} of {n_used:,} {where} have no normal: they get the one of faces")
+            losses.say(f"missing normals at {count:,} of {n_used:,} {where}, which get the ones of faces")
         filled = {**data, NORMAL: np.where(has[..., None], given, computed.astype(given.dtype))}
         mesh = replace(mesh, point_data=filled) if at_points else replace(mesh, corner_data=filled)
     return mesh

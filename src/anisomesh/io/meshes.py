@@ -149,7 +149,7 @@ def _content(path: str | os.PathLike[str] | BinaryIO, file_format: str | None) -
     """Return the name of a file or stream for messages, the extension of its format, and its bytes."""
     if not isinstance(path, str | os.PathLike) and hasattr(path, "read"):
         name = _stream_name(path)
-        suffix = known_suffix(name, file_format)
+        suffix = known_suffix(name, file_format, is_stream=True)
         try:
             return name, suffix, bytes(path.read())
         except (OSError, TypeError) as error:
@@ -204,7 +204,7 @@ def save(
     stream: Any = path if not isinstance(path, str | os.PathLike) and hasattr(path, "write") else None
     name = str(_as_path(path)) if stream is None else _stream_name(stream)
     mesh = mesh if isinstance(mesh, Mesh) else from_object(mesh)
-    suffix = known_suffix(name, file_format)
+    suffix = known_suffix(name, file_format, is_stream=stream is not None)
     if point_data:
         mesh = _with_point_data(mesh, name, point_data)
     losses = Losses()
