@@ -252,7 +252,7 @@ def _check_tolerance(surface: Surface, tolerance: float) -> None:
     if not (np.isfinite(tolerance) and tolerance >= 0) or (tolerance > limit and tolerance > 0):
         raise OptionError(
             f"weld_tolerance is {tolerance:g}; expected a length in model units from 0 to {limit:g}, a tenth of the "
-            "bounding-box diagonal"
+            "bounding-box diagonal, or 'auto'"
         )
 
 
