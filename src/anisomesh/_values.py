@@ -30,13 +30,26 @@ class Length:
         OptionError
             If the text is not a positive finite number, with or without a per cent sign.
         """
-        try:
-            value = float(text.removesuffix("%"))
-        except ValueError:
-            raise OptionError(f"{option} {text}: expected a length such as 0.2, or 0.1% of the diagonal") from None
-        if not (math.isfinite(value) and value > 0):
+        found = cls._number(text, option)
+        if not (math.isfinite(found.value) and found.value > 0):
             raise OptionError(f"{option} {text}: expected a positive finite length")
-        return cls(value, text.endswith("%"))
+        return found
+
+    @classmethod
+    def tolerance(cls, text: str, option: str) -> Length:
+        """Return the length up to which points are the same, which may be 0, as :meth:`parse`."""
+        found = cls._number(text, option, ", or auto")
+        if not (math.isfinite(found.value) and found.value >= 0):
+            raise OptionError(f"{option} {text}: expected a finite length of at least 0, or auto")
+        return found
+
+    @classmethod
+    def _number(cls, text: str, option: str, others: str = "") -> Length:
+        try:
+            return cls(float(text.removesuffix("%")), text.endswith("%"))
+        except ValueError:
+            expected = f"expected a length such as 0.2, or 0.1% of the diagonal{others}"
+            raise OptionError(f"{option} {text}: {expected}") from None
 
     def on(self, diagonal: float) -> float:
         """Return the length for a mesh with this bounding-box diagonal, in model units."""

@@ -6,6 +6,7 @@ import math
 import os
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, fields, replace
+from numbers import Number
 from typing import TYPE_CHECKING, Any, Literal, get_args
 
 from anisomesh._values import LARGEST_SIZE, real_number, whole_number
@@ -204,6 +205,10 @@ class RemeshOptions:
             if value is not None and name != "gradation" and not 1.0 / LARGEST_SIZE < value < LARGEST_SIZE:
                 limits = f"{1.0 / LARGEST_SIZE:g} to {LARGEST_SIZE:g}"
                 raise OptionError(f"{name} = {value:g}; expected a length that fits the mesh, from {limits}")
+        for name, remedy in (("size_field", ", or a function of points; edge_length is one length"), ("density", "")):
+            value = getattr(self, name)
+            if isinstance(value, Number | str):
+                raise OptionError(f"{name} = {value!r}; expected an array (V,), a value for each point{remedy}")
         if (self.edge_length is not None or self.size_field is not None) and self.density is not None:
             raise OptionError(
                 "a density and an edge_length or size_field both say how large triangles are; leave one out"

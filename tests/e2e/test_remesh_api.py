@@ -172,7 +172,18 @@ def test_tensors_at_corners_belong_to_the_faces_of_the_working_surface():
     ("options", "words"),
     [
         ({}, "give one of n_vertices, ratio, max_error and edge_length"),
-        ({"n_vertices": 100, "ratio": 0.5}, "give one of n_vertices, ratio, max_error and edge_length"),
+        (
+            {"n_vertices": 9, "metric": "uniform", "size_field": 0.2},
+            r"an array \(V,\), a value .* edge_length is one length",
+        ),
+        (
+            {"n_vertices": 9, "density": np.float32(2)},
+            r"density = .*; expected an array \(V,\), a value for each point",
+        ),
+        (
+            {"n_vertices": 100, "ratio": 0.5},
+            "n_vertices and ratio are given; give one of n_vertices, ratio, max_error and edge_length",
+        ),
         ({"n_vertices": 3}, "at least 4"),
         ({"n_vertices": 0}, "at least 4"),
         ({"n_vertices": 10.5}, "whole number"),

@@ -161,12 +161,12 @@ def test_what_locked_faces_carry_is_the_same(lock):
 @pytest.mark.parametrize(
     ("lock", "message"),
     [
-        ("bottom", r"lock = 'bottom' is not a region of the mesh; its regions are 'top', 'part 9'"),
+        ("bottom", r"lock = 'bottom' is not a region of the mesh; its regions are 'part top', 'part 9'"),
         (5, r"lock = 5 is not a region of the mesh; .*; groups of lines or points cannot be selected"),
         (0.5, r"lock = 0.5; expected the name or label of a region"),
         (
             np.zeros(BOX.n_faces, dtype=bool),
-            r"lock is a mask that selects no face; leave it out, or its regions are 'top'",
+            r"lock is a mask that selects no face; select some, or leave it out",
         ),
         (
             np.ones(3, dtype=bool),

@@ -50,6 +50,11 @@ def test_the_result_has_the_data_of_the_mesh(ball):
 def test_other_targets_and_grids(ball):
     assert ball.anisomesh.remesh(ratio=0.2, **FEW).n_points == round(0.2 * ball.n_points)
     assert ball.cast_to_unstructured_grid().anisomesh.remesh(50, **FEW).n_points == 50
+    image = pyvista.ImageData(dimensions=(5, 5, 1))
+    assert image.anisomesh.remesh(20, **FEW).n_points == 20
+    blocks = pyvista.MultiBlock({"image": image, "ball": ball})
+    assert set(blocks.anisomesh.remesh(70, **FEW).cell_data["block"]) == {0, 1}
+    assert repr(image.anisomesh) == "ImageData.anisomesh: remesh(n_vertices, ...), evaluate(result, ...)"
 
 
 @pytest.mark.slow

@@ -354,6 +354,16 @@ def test_charts_of_single_faces_stay_within_them():
 def test_other_types_are_an_error():
     with pytest.raises(MeshError, match="expected a Mesh and a Surface, not Surface and Surface"):
         transfer_attributes(sphere(1), sphere(1))
+    with pytest.raises(MeshError, match="as_surface makes a Surface of other objects"):
+        transfer_attributes(Mesh(surface=sphere(1)), sphere(1).points)
+
+
+def test_a_mesh_is_a_target_by_its_surface():
+    source, target = Mesh(surface=sphere(2), point_data={"z": sphere(2).points[:, 2]}), turned(sphere(2))
+    result = transfer_attributes(source, Mesh(surface=target, point_data={"z": np.zeros(target.n_points)}))
+    expected = transfer_attributes(source, target)
+    np.testing.assert_array_equal(result.point_data["z"], expected.point_data["z"])
+    assert result.surface is target
 
 
 @pytest.mark.filterwarnings("error")

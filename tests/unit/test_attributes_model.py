@@ -95,3 +95,21 @@ def test_what_is_not_data_by_name_is_refused(field, value, words):
 def test_labels_beyond_64_bits_are_refused():
     with pytest.raises(MeshError, match="int64"):
         Regions(np.array([1, 2**64 - 1], dtype=np.uint64))
+
+
+@pytest.mark.parametrize(
+    ("names", "words"),
+    [
+        ({"x": "a"}, r"the label 'x', which is not an integer; expected a dictionary of names by label"),
+        ({1.5: "a"}, r"the label 1.5, which is not an integer"),
+        ({None: "a"}, r"the label None, which is not an integer"),
+        ({float("inf"): "a"}, r"the label inf, which is not an integer"),
+        (["inlet"], r"names of regions are of type list; expected a dictionary"),
+        (None, r"names of regions are of type NoneType; expected a dictionary"),
+    ],
+)
+def test_names_of_regions_are_by_integers(names, words):
+    """Regression: the error was the one of Python's int."""
+    with pytest.raises(MeshError, match=words):
+        Regions(np.array([1, 2]), names)
+    assert Regions(np.array([1, 2]), {np.int32(1): "inlet", 2.0: 5}).names == {1: "inlet", 2: "5"}

@@ -111,7 +111,7 @@ def test_faults_of_jobs_are_found_before_any_work(meshes, tmp_path):
         ([Job(input=a, output="x.ply", options={**TARGET, "metric": [1, 2]})], "expected the name of a metric"),
         ([Job(input=a, output="x.ply", options={"metric_file": "no.npy"})], "no such file: .*no.npy"),
         ([Job(input=a, output="x.ply", options={"metric_file": a, "adapt_to": "u"})], "give one of them"),
-        ([Job(input=a, output="x.ply", options={"adapt_to": "u", "edge_length": 1.0})], "n_vertices or ratio with it"),
+        ([Job(input=a, output="x.ply", options={"adapt_to": "u", "edge_length": 1.0})], "ratio or ratios with it"),
         ([Job(input=a, output="x.ply", options={**TARGET, "min_size": 1.0})], "only sizes can be limited"),
         ([Job(input=a, output="x.ply", options={"metric_file": a, "gradation": -1.0})], "gradation = -1"),
         ([Job(input=a, output="x.ply", options={**TARGET, "norm": 2})], "norm goes with adapt_to"),
@@ -131,6 +131,13 @@ def test_options_have_one_form_and_none_that_is_as_by_default():
     given = {"ratio": "20%", "max_error": None, "seed": 0, "weld_tolerance": "0.5", "metric": "uniform", "fit": True}
     assert plain_options(given, "x") == {"ratio": 0.2, "weld_tolerance": 0.5, "metric": "uniform"}
     assert plain_options({"max_error": "0.1%"}, "x") == {"max_error": "0.1%"}
+    assert plain_options({"ratio": 0.2, "weld_tolerance": "0"}, "x") == {"ratio": 0.2}
+    with pytest.raises(OptionError, match="weld_tolerance -1%: expected a finite length of at least 0, or auto"):
+        plain_options({"ratio": 0.2, "weld_tolerance": "-1%"}, "x")
+    with pytest.raises(OptionError, match="not how small; give n_vertices, ratio or ratios with it"):
+        plain_options({"adapt_to": "u"}, "x")
+    with pytest.raises(OptionError, match="max_error 0: expected a positive finite length"):
+        plain_options({"max_error": "0"}, "x")
     assert for_mesh({"max_error": "0.1%", "weld_tolerance": "auto"}, 20.0) == {
         "max_error": pytest.approx(0.02),
         "weld_tolerance": "auto",

@@ -96,3 +96,5 @@ def test_other_objects_are_refused():
     for mesh in (3, "a", None, object()):
         with pytest.raises(MeshError, match="cannot read a mesh from"):
             as_surface(mesh)
+    with pytest.raises(MeshError, match=r"from tuple; expected a Surface, as Surface\(points, faces\) of two arrays"):
+        as_surface((np.eye(3), np.array([[0, 1, 2]])))

@@ -1,9 +1,11 @@
 """Particular valid and invalid files, and the files that writing leaves behind."""
 
+import io
 import logging
 import struct
 import subprocess
 import sys
+from functools import partial
 from pathlib import Path
 
 import meshio
@@ -256,6 +258,9 @@ def test_impossible_targets_are_refused(tmp_path):
         save(BOX, tmp_path / "none" / "a.obj")
     with pytest.raises(MeshFileError, match="unknown format"):
         save(BOX, tmp_path / "a.docx")
+    for use in (partial(save, BOX), load):
+        with pytest.raises(MeshFileError, match=r"stream: .*; give file_format, one of \.3mf, "):
+            use(io.BytesIO())
     (tmp_path / "a.obj").mkdir()
     with pytest.raises(MeshFileError, match="not a plain file"):
         save(BOX, tmp_path / "a.obj")

@@ -67,7 +67,7 @@ def test_no_file_has_normals_of_length_zero(tmp_path, caplog, suffix, at):
     elif suffix in (".glb", ".off"):  # one normal for each point
         np.testing.assert_array_equal(list(after.values()), [UP] * 6)
         assert ("1 of 4 points" if at == "points" or suffix == ".off" else "1 of 6 corners") in said
-        assert "have no normal: they get the one of faces" in said
+        assert "missing normals at 1 of " in said
     else:
         assert suffix == ".obj"
         assert "vn 0" not in (tmp_path / "a.obj").read_text().replace("vn 0.0 0.0 1.0", "")

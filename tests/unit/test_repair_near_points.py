@@ -5,7 +5,7 @@ import json
 import numpy as np
 import pytest
 
-from anisomesh.errors import OptionError
+from anisomesh.errors import MeshError, OptionError
 from anisomesh.mesh.surface import Surface
 from anisomesh.options import RemeshOptions
 from anisomesh.repair.near_points import AUTO_WELD, count_near_boundary_points, weld_distance
@@ -21,6 +21,14 @@ def cracked(noise, seed=0):
     corners = BALL.points[BALL.faces].reshape(-1, 3)
     step = np.random.default_rng(seed).uniform(-1, 1, corners.shape) / 3**0.5
     return Surface(corners + noise * BALL.diagonal * step, np.arange(len(corners)).reshape(-1, 3))
+
+
+def test_a_tolerance_that_leaves_no_face_is_named():
+    with pytest.raises(MeshError, match=r"no\w* of the 320 faces has an area once .* give a smaller weld_tolerance"):
+        prepare(BALL, weld_tolerance=0.1 * BALL.diagonal)
+    flat = Surface([(0, 0, 0), (1, 0, 0), (2, 0, 0)], [(0, 1, 2)])
+    with pytest.raises(MeshError, match="none of the 1 faces has an area; nothing is left"):
+        prepare(flat, weld_tolerance=0.1)
 
 
 def test_cracks_count_and_the_tolerance_closes_them():

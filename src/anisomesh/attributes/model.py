@@ -30,6 +30,11 @@ class Regions:
         Label of the region of each face (F,), any integers; of edges or points (n,), with 0 for none.
     names
         Names of labels, for the ones that have one.
+
+    Raises
+    ------
+    MeshError
+        If labels are not integers, or names are not a dictionary of names by label.
     """
 
     labels: Ints
@@ -37,7 +42,7 @@ class Regions:
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "labels", _whole_numbers("region labels", self.labels))
-        object.__setattr__(self, "names", {int(label): str(name) for label, name in dict(self.names).items()})
+        object.__setattr__(self, "names", _names_of_labels(self.names))
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
@@ -196,6 +201,25 @@ def _whole_numbers(name: str, values: Any) -> Ints:
     array = array.astype(np.int64)
     array.flags.writeable = False
     return array
+
+
+def _names_of_labels(names: Any) -> dict[int, str]:
+    """Return names by label, or an error unless they are given by integers."""
+    expected = "expected a dictionary of names by label, such as {1: 'inlet'}"
+    try:
+        given = dict(names)
+    except (TypeError, ValueError) as error:
+        raise MeshError(f"names of regions are of type {type(names).__name__}; {expected}") from error
+    found = {}
+    for label, name in given.items():
+        try:
+            number = int(label)
+        except (TypeError, ValueError, OverflowError):
+            number = None
+        if number is None or number != label:
+            raise MeshError(f"names of regions have the label {label!r}, which is not an integer; {expected}")
+        found[number] = str(name)
+    return found
 
 
 def _points_of(name: str, values: Any, count: int, width: int, what: str = "point") -> Ints:

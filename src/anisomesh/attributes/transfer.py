@@ -17,7 +17,7 @@ from anisomesh.mesh.closest_points import ClosestPoints
 from anisomesh.mesh.surface import Surface
 
 
-def transfer_attributes(source: Mesh, target: Surface) -> Mesh:
+def transfer_attributes(source: Mesh, target: Surface | Mesh) -> Mesh:
     """Return a surface with everything that a mesh of about the same surface carries.
 
     Parameters
@@ -26,7 +26,8 @@ def transfer_attributes(source: Mesh, target: Surface) -> Mesh:
         The mesh. It need be neither manifold nor oriented; where it is thin, the sheet that faces the way of the target
         is taken.
     target
-        A surface near the one of the mesh, in the same units. If it is the same one, everything is returned unchanged.
+        A surface near the one of the mesh, in the same units, or a mesh with this surface, whose own attributes are not
+        looked at. If it is the same surface, everything is returned unchanged.
 
     Returns
     -------
@@ -54,8 +55,12 @@ def transfer_attributes(source: Mesh, target: Surface) -> Mesh:
       the ones of the source; they are in the regions of the closest of these. *Fixed faces* are the faces of the target
       with the same corners.
     """
+    target = target.surface if isinstance(target, Mesh) else target
     if not isinstance(source, Mesh) or not isinstance(target, Surface):
-        raise MeshError(f"expected a Mesh and a Surface, not {type(source).__name__} and {type(target).__name__}")
+        raise MeshError(
+            f"expected a Mesh and a Surface, not {type(source).__name__} and {type(target).__name__}; load_mesh reads "
+            "a Mesh from a file, and as_surface makes a Surface of other objects"
+        )
     own = source.surface
     if np.array_equal(own.points, target.points) and np.array_equal(own.faces, target.faces):
         return replace(source, surface=target)

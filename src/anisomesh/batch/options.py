@@ -73,7 +73,7 @@ def _check(options: Options) -> None:
     target = {name: keywords.pop(name) for name in TARGETS[:4] if name in keywords}
     known = with_overrides(RemeshOptions(), keywords)
     if len(target) > 1:
-        raise OptionError(f"give one of {', '.join(TARGETS)}")
+        raise OptionError(f"{' and '.join(target)} are given; give one of {', '.join(TARGETS)}")
     if "ratios" in target:
         read_levels(None, target["ratios"], known)
     elif target or "metric_file" not in options:
@@ -100,8 +100,11 @@ def _check_metric(options: Options) -> None:
         raise OptionError(
             f"edge_length = {options['edge_length']}: in the metric of a file it is a number, and 1 without this option"
         )
-    if "adapt_to" in options and ("edge_length" in options or "max_error" in options):
-        raise OptionError("adapt_to says where triangles are small, not how small; give n_vertices or ratio with it")
+    counted = [name for name in ("n_vertices", "ratio", "ratios") if name in options]
+    if "adapt_to" in options and not (counted and "edge_length" not in options and "max_error" not in options):
+        raise OptionError(
+            "adapt_to says where triangles are small, not how small; give n_vertices, ratio or ratios with it"
+        )
 
 
 def file_and_field(name: str, spec: str) -> tuple[str | None, str]:
@@ -141,7 +144,7 @@ def in_model_units(options: Options, diagonal: float) -> Options:
     """Return options whose lengths are numbers, for a mesh with this bounding-box diagonal in model units."""
     lengths = {name: options[name] for name in _LENGTHS if isinstance(options.get(name), str)}
     return options | {
-        name: text if (name, text) == ("weld_tolerance", "auto") else Length.parse(text, name).on(diagonal)
+        name: text if (name, text) == ("weld_tolerance", "auto") else _length(name, text).on(diagonal)
         for name, text in lengths.items()
     }
 
@@ -186,8 +189,12 @@ def _read(name: str, value: Any) -> Any:
     if name == "ratio" and value.endswith("%"):
         return _share(name, value)
     if name in _LENGTHS and value != "auto" and not value.endswith("%"):
-        return Length.parse(value, name).value
+        return _length(name, value).value
     return value
+
+
+def _length(name: str, text: str) -> Length:
+    return Length.tolerance(text, name) if name == "weld_tolerance" else Length.parse(text, name)
 
 
 def _share(name: str, value: Any) -> Any:

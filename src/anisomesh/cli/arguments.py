@@ -216,10 +216,10 @@ def length(text: str, option: str) -> Length:
     Raises
     ------
     typer.BadParameter
-        If the text is not a positive finite number, with or without a per cent sign.
+        If the text is not a positive finite number, with or without a per cent sign; ``--weld`` may be 0.
     """
     try:
-        return Length.parse(text, option)
+        return Length.tolerance(text, option) if option == "--weld" else Length.parse(text, option)
     except OptionError as error:
         raise typer.BadParameter(str(error)) from None
 

@@ -29,6 +29,7 @@ from anisomesh.cli.inputs import check_present
 from anisomesh.cli.job import check_format
 from anisomesh.cli.progress import Display, announce_compilation, progress
 from anisomesh.cli.ratios import shares
+from anisomesh.cli.remeshing.prescribed_metric import check_targets
 from anisomesh.cli.remeshing.shared_options import (
     AdaptedTo,
     Gradation,
@@ -148,9 +149,7 @@ def _jobs(
     if not sources and manifest is None:
         raise typer.BadParameter("name meshes, folders or patterns, or a --manifest")
     if not options.keys() & {*TARGETS, "metric_file"} and sources:
-        raise typer.BadParameter(
-            "give one of -n (number of vertices), --ratio, --ratios, --max-error and --edge-length, or --metric-file"
-        )
+        check_targets({}, None, options.get("adapt_to"))
     check_present(manifest, *(Path(name) for name in sources if not is_address(name) and not glob.has_magic(name)))
     listed = [] if manifest is None else read_manifest(manifest, options, output_format=output_format)
     return [*listed, *jobs_of(sources, options, output_format=output_format, without=out)]

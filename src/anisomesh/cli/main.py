@@ -7,6 +7,7 @@ Exit codes: 0 done, 1 anisomesh refused or failed (one line on stderr), 2 wrong 
 from __future__ import annotations
 
 import os
+import re
 import sys
 from typing import Annotated
 
@@ -98,6 +99,15 @@ def main(arguments: list[str]) -> int:
     return int(status)
 
 
+_WORDS_OF_TYPER = {  # what versions of it that use pydantic say, and we in place of it
+    "Value error, ": "",
+    r"Input should be a valid integer\b.*": "expected a whole number",
+    r"Input should be a valid number\b.*": "expected a number",
+    r"Input should be greater than or equal to (\S+)": r"expected at least \1",
+    r"Input should be less than or equal to (\S+)": r"expected at most \1",
+}
+
+
 def _fail(message: str, status: int) -> int:
     print(f"anisomesh: error: {' '.join(message.split())}", file=sys.stderr)
     return status
@@ -107,5 +117,6 @@ def _usage_message(error: Exception) -> str:
     context = getattr(error, "ctx", None)
     command = context.command_path if context else "anisomesh"
     message = error.format_message() if hasattr(error, "format_message") else str(error)
-    message = message.replace("Value error, ", "")  # a prefix of some versions of typer
+    for pattern, words in _WORDS_OF_TYPER.items():
+        message = re.sub(pattern, words, message)
     return f"{message.rstrip('.')}; see '{command} --help'"

@@ -19,9 +19,12 @@ def read_target(
 
     All are None if the options have an edge length, or a size field or tensors and none is given.
     """
-    given = sum(value is not None for value in (n_vertices, ratio, max_error))
-    if given + (options.edge_length is not None) > 1 or not (given or options.absolute_length is not None):
-        raise OptionError("give one of n_vertices, ratio, max_error and edge_length")
+    targets = {"n_vertices": n_vertices, "ratio": ratio, "max_error": max_error, "edge_length": options.edge_length}
+    names = [name for name, value in targets.items() if value is not None]
+    given = n_vertices is not None or ratio is not None or max_error is not None
+    if len(names) > 1 or not (given or options.absolute_length is not None):
+        are_given = f"{' and '.join(names)} are given; " if names else ""
+        raise OptionError(f"{are_given}give one of n_vertices, ratio, max_error and edge_length")
     if not given:
         if options.density is not None:
             raise OptionError("a density has no unit; give n_vertices or ratio beside it")

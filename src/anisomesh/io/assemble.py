@@ -98,7 +98,7 @@ def _say_empty_regions(carried: Carried, mesh: Mesh) -> None:
         }
         empty = [text for text in dict.fromkeys(texts) if text and text not in kept]
         if empty:
-            told.append(f"{name} {listed(list(map(repr, empty)))}")
+            told.append(f"{name} {listed(list(map(repr, empty)))}".lstrip())
     if told:
         carried.remarks.append(f"left out the names of regions with nothing in them: {'; '.join(told)}")
 

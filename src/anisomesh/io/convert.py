@@ -74,8 +74,8 @@ def _converted(mesh: Any, faces: npt.NDArray[Any] | None) -> tuple[Mesh, tuple[s
         raise MeshError(f"cannot read a surface from {name}: {error}") from error
     if found is None:
         raise MeshError(
-            f"cannot read a mesh from {name}; expected points and faces, a Surface, or an object of trimesh, meshio or "
-            "PyVista"
+            f"cannot read a mesh from {name}; expected a Surface, as Surface(points, faces) of two arrays, or an "
+            "object of trimesh, meshio or PyVista"
         )
     converted, remarks, losses = found
     for remark in remarks:

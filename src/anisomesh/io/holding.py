@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
+from typing import Any
 
 import numpy as np
 import numpy.typing as npt
@@ -24,7 +25,7 @@ EMPTY_REGIONS = "names of regions with nothing in them,"
 TOO_LARGE = "whose integers are too large for float64"
 """Why integers of 64 bits are left out."""
 
-_LARGEST_EXACT = 2**53  # up to it every integer has a float64
+_LARGEST_EXACT = 2**53 - 1  # up to it every integer has a float64 of its own
 
 
 class Losses:
@@ -81,12 +82,27 @@ class Losses:
         """Return everything in one line, empty if nothing is left out."""
         parts = []
         for what, names in self._names.items():
-            plain = [repr(name) for name in names if (what, name) not in self._reasons]
+            parts += [f"{what} without a name"] if "" in names and not what.startswith("names of ") else []
+            plain = [repr(name) for name in names if name and (what, name) not in self._reasons]
             parts += [f"{what} {', '.join(plain)}"] if plain else []
-            parts += [f"{what} {name!r}, {why}" for name in names if (why := self._reasons.get((what, name)))]
+            parts += [f"{what} {name!r}, {why}" for name in names if name and (why := self._reasons.get((what, name)))]
         if self._changed:
             parts.append(f"some characters of {len(self._changed)} name(s) such as {self._changed[0]!r}")
         return "; ".join([*parts, *self._others])
+
+
+def without_unnamed(mesh: Mesh, losses: Losses, *, divisions: bool = False) -> Mesh:
+    """Return a mesh without data that have no name, which no format holds; without such divisions too if asked for."""
+    kinds = {"point_data": "point data", "face_data": "face data", "corner_data": "corner data"}
+    if divisions:
+        kinds |= {"regions": "regions", "feature_regions": OF_FEATURES, "fixed_point_regions": OF_FIXED_POINTS}
+    for kind, what in kinds.items():
+        given = getattr(mesh, kind)
+        if "" in given:
+            losses.add(what, "")
+            changes: dict[str, Any] = {kind: {name: values for name, values in given.items() if name}}
+            mesh = replace(mesh, **changes)
+    return mesh
 
 
 def numeric(data: Mapping[str, Array], what: str, losses: Losses) -> dict[str, Array]:
@@ -192,7 +208,7 @@ def with_all_normals(mesh: Mesh, losses: Losses) -> Mesh:
         used = np.isin(np.arange(surface.n_points), surface.faces) if at_points else np.ones_like(has)
         if (count := np.count_nonzero(used & ~has)) > 0:
             n_used = np.count_nonzero(used)
-            losses.say(f"that {count:,} of {n_used:,} {where} have no normal: they get the one of faces")
+            losses.say(f"missing normals at {count:,} of {n_used:,} {where}, which get the ones of faces")
         filled = {**data, NORMAL: np.where(has[..., None], given, computed.astype(given.dtype))}
         mesh = replace(mesh, point_data=filled) if at_points else replace(mesh, corner_data=filled)
     return mesh

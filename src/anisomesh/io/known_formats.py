@@ -57,14 +57,19 @@ MESH_FORMATS = tuple(READERS)
 """Extensions of files that are read and written, in lower case with the dot."""
 
 
-def known_suffix(path: str | Path, file_format: str | None) -> str:
-    """Return the extension of the format in lower case, or raise MeshFileError if it is unknown."""
+def known_suffix(path: str | Path, file_format: str | None, *, is_stream: bool = False) -> str:
+    """Return the extension of the format in lower case, or raise MeshFileError if it is unknown.
+
+    The message says how the format of a stream is given.
+    """
     expected = ", ".join(sorted(MESH_FORMATS))
     if file_format is not None:
         suffix = "." + file_format.lower().removeprefix(".") if isinstance(file_format, str) else ""
         if suffix not in MESH_FORMATS:
             raise MeshFileError(f"{path}: unknown format {file_format!r}; expected one of {expected}")
         return suffix
+    if is_stream and not Path(path).suffix:
+        raise MeshFileError(f"{path}: has no name that ends in a format; give file_format, one of {expected}")
     suffix = Path(path).suffix.lower()
     if suffix not in MESH_FORMATS:
         raise MeshFileError(

@@ -18,7 +18,7 @@ from anisomesh.io.assemble import as_mesh
 from anisomesh.io.atomic import atomic_path
 from anisomesh.io.convert import from_object
 from anisomesh.io.formats.words import BYTE_ORDER_MARK
-from anisomesh.io.holding import Losses
+from anisomesh.io.holding import Losses, without_unnamed
 from anisomesh.io.known_formats import READERS, TEXT_FORMATS, WRITERS, known_suffix
 from anisomesh.io.materials import files as material_files
 from anisomesh.io.materials import from_gltf
@@ -149,7 +149,7 @@ def _content(path: str | os.PathLike[str] | BinaryIO, file_format: str | None) -
     """Return the name of a file or stream for messages, the extension of its format, and its bytes."""
     if not isinstance(path, str | os.PathLike) and hasattr(path, "read"):
         name = _stream_name(path)
-        suffix = known_suffix(name, file_format)
+        suffix = known_suffix(name, file_format, is_stream=True)
         try:
             return name, suffix, bytes(path.read())
         except (OSError, TypeError) as error:
@@ -204,7 +204,7 @@ def save(
     stream: Any = path if not isinstance(path, str | os.PathLike) and hasattr(path, "write") else None
     name = str(_as_path(path)) if stream is None else _stream_name(stream)
     mesh = mesh if isinstance(mesh, Mesh) else from_object(mesh)
-    suffix = known_suffix(name, file_format)
+    suffix = known_suffix(name, file_format, is_stream=stream is not None)
     if point_data:
         mesh = _with_point_data(mesh, name, point_data)
     losses = Losses()
@@ -238,7 +238,7 @@ def file_content(mesh: Mesh, name: str, suffix: str, losses: Losses, *, in_file:
     MeshFileError
         If the format cannot hold the mesh.
     """
-    folder = material_files.folder_of(name) if in_file else Path.cwd()
+    folder, mesh = material_files.folder_of(name) if in_file else Path.cwd(), without_unnamed(mesh, losses)
     mesh = material_files.with_texture_names(mesh, lambda name: material_files.relative_name(name, folder))
     looks: dict[int, from_gltf.Look] = {}
     if suffix == ".glb":

@@ -10,7 +10,7 @@ from anisomesh.attributes.model import Mesh
 from anisomesh.errors import MeshFileError
 from anisomesh.io.atomic import atomic_paths
 from anisomesh.io.formats.gltf.write import glb_levels_bytes
-from anisomesh.io.holding import Losses
+from anisomesh.io.holding import Losses, without_unnamed
 from anisomesh.io.known_formats import known_suffix
 from anisomesh.io.materials import files as material_files
 from anisomesh.io.materials.for_gltf import with_gltf_materials
@@ -72,7 +72,10 @@ def save_meshes(meshes: Sequence[Mesh], path: str | os.PathLike[str], *, file_fo
 def _glb_content(meshes: Sequence[Mesh], path: Path, losses: Losses) -> bytes:
     folder = material_files.folder_of(path)
     named = [
-        material_files.with_texture_names(m, lambda name: material_files.relative_name(name, folder)) for m in meshes
+        material_files.with_texture_names(
+            without_unnamed(mesh, losses), lambda name: material_files.relative_name(name, folder)
+        )
+        for mesh in meshes
     ]
     try:
         return glb_levels_bytes(with_gltf_materials(named, losses), losses)

@@ -47,7 +47,8 @@ class MetricFile:
     def description(self) -> str:
         """What was read, in a line."""
         field = self.field
-        what = "sizes" if field.kind == "scalar" else f"tensors, read as {field.layout}"
+        way = field.layout if field.layout == "row by row" else f"as {field.layout}"
+        what = "sizes" if field.kind == "scalar" else f"tensors, read {way}"
         return f"metric of {field.path}, field {field.name!r}: {what}, at {len(field.values):,} points"
 
     @property

@@ -8,10 +8,21 @@ import numpy.typing as npt
 from anisomesh._arrays import FaceMask, Faces, Floats, Points
 from anisomesh._kernels import degenerate as kernels
 from anisomesh.mesh import geometry, topology
+from anisomesh.mesh.surface import Surface
 
 _DEGENERATE_RATIO = 1e-14  # 2 area over longest side^2 of degenerate faces: above the rounding error of the area
 _THIN_FACTOR = 2.0  # times that ratio for faces that are looked at closely, beyond all rounding
 _MAX_REMOVAL_ROUNDS = 100  # bounds the time on meshes with long chains of caps; heuristic
+
+
+def why_none_is_left(surface: Surface, tolerance: float) -> str:
+    """Return a message for a surface without a face that has an area, once points up to a distance are welded."""
+    if is_degenerate(surface.points, surface.faces).all():
+        return f"none of the {surface.n_faces:,} faces has an area; nothing is left after the repair"
+    return (
+        f"none of the {surface.n_faces:,} faces has an area once points up to {tolerance:g} apart are welded, on a "
+        f"mesh whose diagonal is {surface.diagonal:g}; give a smaller weld_tolerance"
+    )
 
 
 def remove_degenerate(

@@ -196,7 +196,7 @@ def _repair_once(surface: Surface, tolerance: float) -> _RepairPass:
     n_nondegenerate = len(faces)
     faces = faces[duplicates.select_unique_faces(labels[faces])]
     if len(faces) == 0:
-        raise MeshError(f"none of the {surface.n_faces:,} faces has an area; nothing is left after the repair")
+        raise MeshError(degenerate.why_none_is_left(surface, tolerance))
     n_unique = len(faces)
     faces, _, n_split = t_junctions.split_at_t_junctions(surface.points, faces, labels, tolerance)
     pairs, nonmanifold = orientation.pair_sides(faces, labels[faces])
@@ -252,7 +252,7 @@ def _check_tolerance(surface: Surface, tolerance: float) -> None:
     if not (np.isfinite(tolerance) and tolerance >= 0) or (tolerance > limit and tolerance > 0):
         raise OptionError(
             f"weld_tolerance is {tolerance:g}; expected a length in model units from 0 to {limit:g}, a tenth of the "
-            "bounding-box diagonal"
+            "bounding-box diagonal, or 'auto'"
         )
 
 

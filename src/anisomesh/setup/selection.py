@@ -55,7 +55,7 @@ def _mask(name: str, values: FaceMask, mesh: Mesh) -> FaceMask:
             "after reading, when polygons are split into triangles and other cells left out"
         )
     if not values.any():
-        raise OptionError(f"{name} is a mask that selects no face; leave it out, or {_remedy(mesh)}")
+        raise OptionError(f"{name} is a mask that selects no face; select some, or leave it out")
     return values
 
 
@@ -78,7 +78,7 @@ def _faces_of(name: str, mesh: Mesh, wanted: Any) -> FaceMask:
 
 
 def _regions(mesh: Mesh) -> Iterator[tuple[str, int, tuple[str, ...]]]:
-    """Yield division, label and names of each region, the name for messages first."""
+    """Yield division, label and names of each region: its own, with the division in front, and with its label."""
     for division, regions in mesh.regions.items():
         for label in np.unique(regions.labels).tolist():
             own = [regions.names[label]] if label in regions.names else []
@@ -87,7 +87,7 @@ def _regions(mesh: Mesh) -> Iterator[tuple[str, int, tuple[str, ...]]]:
 
 def _remedy(mesh: Mesh) -> str:
     """Return what to select instead."""
-    names = [repr(names[0]) for _, _, names in _regions(mesh)]
+    names = [repr(names[len(names) // 2]) for _, _, names in _regions(mesh)]  # with the division in front
     if not names:
         return "it has no regions: give it some, or in Python a mask of faces"
     more = f" and {len(names) - _MAX_LISTED:,} more" if len(names) > _MAX_LISTED else ""

@@ -24,11 +24,14 @@ class Accessor:
     Parameters
     ----------
     mesh
-        The mesh, a ``pyvista.PolyData`` or ``pyvista.UnstructuredGrid``. It is not changed.
+        The mesh, any data set of PyVista whose cells are a surface, or a ``pyvista.MultiBlock``. It is not changed.
     """
 
     def __init__(self, mesh: Any) -> None:
         self._mesh = mesh
+
+    def __repr__(self) -> str:
+        return f"{type(self._mesh).__name__}.anisomesh: remesh(n_vertices, ...), evaluate(result, ...)"
 
     def remesh(self, n_vertices: int | None = None, **options: Any) -> Any:
         """Return the mesh remeshed anisotropically, with its point, cell and field data.
@@ -69,5 +72,5 @@ class Accessor:
         return evaluate_meshes(self._mesh, result, **options)
 
 
-for _kind in (pyvista.PolyData, pyvista.UnstructuredGrid):
+for _kind in (pyvista.DataSet, pyvista.MultiBlock):
     pyvista.register_dataset_accessor("anisomesh", _kind)(Accessor)

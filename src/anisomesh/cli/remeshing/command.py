@@ -30,7 +30,13 @@ from anisomesh.cli.job import (
 )
 from anisomesh.cli.progress import progress
 from anisomesh.cli.remeshing.levels import LevelOutputs, levels_summary, run_levels, targets_of
-from anisomesh.cli.remeshing.prescribed_metric import check_limits, file_named, file_of, prescribed_metric
+from anisomesh.cli.remeshing.prescribed_metric import (
+    check_limits,
+    check_targets,
+    file_named,
+    file_of,
+    prescribed_metric,
+)
 from anisomesh.cli.remeshing.shared_options import (
     AdaptedTo,
     Gradation,
@@ -157,11 +163,8 @@ def command(
 
     IN may be -, which is standard input.
     """
-    targets = 5 - (n_vertices or None, ratio or None, ratios, max_error, edge_length).count(None)
-    if targets > 1 or (targets == 0 and metric_file is None):
-        raise typer.BadParameter(
-            "give one of -n (number of vertices), --ratio, --ratios, --max-error and --edge-length, or --metric-file"
-        )
+    targets = {"-n": n_vertices, "--ratio": ratio, "--ratios": ratios, "--max-error": max_error}
+    check_targets({**targets, "--edge-length": edge_length}, metric_file, adapt_to)
     target, n_levels = targets_of(n_vertices, ratio, ratios)
     check_present(source, file_named(metric_file, adapt_to), features, density, keep_points)
     prescribed = prescribed_metric(context, metric_file, adapt_to, norm, edge_length=edge_length, max_error=max_error)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -11,6 +12,27 @@ from anisomesh.errors import OptionError
 
 if TYPE_CHECKING:
     from anisomesh.metric.prescribed import AdaptTo, MetricFile
+
+_HOW_SMALL = "--adapt-to says where triangles are small, not how small; give -n, --ratio or --ratios with it"
+
+
+def check_targets(given: Mapping[str, object], metric_file: str | None, adapt_to: str | None) -> None:
+    """Check that one option, by its name, says how many vertices there are to be, unless a metric does.
+
+    Raises
+    ------
+    typer.BadParameter
+        If none or several are given.
+    """
+    names = [name for name, value in given.items() if value is not None]
+    if not names and adapt_to is not None and metric_file is None:
+        raise typer.BadParameter(_HOW_SMALL)
+    if len(names) > 1 or not (names or metric_file):
+        are_given = f"{' and '.join(names)} are given; " if names else ""
+        raise typer.BadParameter(
+            f"{are_given}give one of -n (number of vertices), --ratio, --ratios, --max-error and --edge-length, or "
+            "--metric-file"
+        )
 
 
 def prescribed_metric(
@@ -50,7 +72,7 @@ def prescribed_metric(
     if adapt_to is None:
         return None
     if edge_length is not None or max_error is not None:
-        raise typer.BadParameter("--adapt-to says where triangles are small, not how small; give -n or --ratio with it")
+        raise typer.BadParameter(_HOW_SMALL)
     try:
         return AdaptTo.parse(adapt_to, norm or DEFAULT_NORM, context.params["feature_angle"])
     except OptionError as error:

@@ -13,7 +13,14 @@ from anisomesh.io.carried import Carried, Division, Integers
 from anisomesh.io.holding import EMPTY_REGIONS, Losses
 
 _NUMBERED = "region_"  # in front of the number of a region without a name
-_NUMBER = re.compile(rf"{_NUMBERED}(-?\d{{1,18}})")
+_DIGITS = re.compile(r"-?\d{1,19}")  # of labels, which have 64 bits
+
+
+def label_of(text: str) -> int | None:
+    """Return the label that a text writes in digits, None if it is not an integer of 64 bits."""
+    number = int(text) if _DIGITS.fullmatch(text) else None
+    limits = np.iinfo(np.int64)
+    return number if number is not None and limits.min <= number <= limits.max else None
 
 
 def exactly(text: str) -> str:
@@ -71,7 +78,11 @@ def region_texts(
 
 def is_number(text: str) -> bool:
     """Return whether a text stands for a region without a name, by its number."""
-    return _NUMBER.fullmatch(text) is not None
+    return _number(text) is not None
+
+
+def _number(text: str) -> int | None:
+    return label_of(text.removeprefix(_NUMBERED)) if text.startswith(_NUMBERED) else None
 
 
 def numbered_regions(texts: Sequence[str], usual: Sequence[int]) -> tuple[list[int], dict[int, str]]:
@@ -84,7 +95,7 @@ def numbered_regions(texts: Sequence[str], usual: Sequence[int]) -> tuple[list[i
     usual
         The labels that they have unless their texts, as :func:`region_texts` makes them, say another.
     """
-    given = [int(match[1]) if (match := _NUMBER.fullmatch(text)) else None for text in texts]
+    given = [_number(text) for text in texts]
     given = [number if number not in given[:k] else None for k, number in enumerate(given)]
     taken = {number for number in given if number is not None}
     labels, names = [], {}

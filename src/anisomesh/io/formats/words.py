@@ -101,7 +101,7 @@ def format_rows(pattern: str, table: npt.NDArray[Any]) -> str:
 def whole(values: npt.NDArray[Any]) -> Integers:
     """Return numbers as int64; ValueError if one is not an integer or too large to be one."""
     if values.dtype.kind == "f" and not ((values == np.rint(values)) & (np.abs(values) < _LARGEST_WHOLE)).all():
-        raise ValueError("malformed: a count, a tag or an index is not an integer")
+        raise ValueError("malformed: a count, a tag or an index is not an integer, or too large")
     if values.dtype.kind == "u" and len(values) and values.max() > np.iinfo(np.int64).max:
         raise ValueError(f"malformed: a count or a tag is {values.max()}")
     return values.astype(np.int64)

@@ -11,7 +11,8 @@ import numpy as np
 from anisomesh.io.carried import Array, Carried, Division, Integers
 from anisomesh.io.cells import Shape, SurfaceCells
 from anisomesh.io.formats.region_names import also_named
-from anisomesh.io.formats.vtk.data import NAMES_OF_REGIONS
+from anisomesh.io.formats.vtk.data import NAMES_OF_FEATURE_REGIONS, NAMES_OF_POINT_REGIONS, NAMES_OF_REGIONS
+from anisomesh.io.formats.vtk.marks import are_marks
 from anisomesh.io.formats.vtk.pieces import Piece, Pieces
 from anisomesh.io.objects.trimesh_scenes import scene_soup
 from anisomesh.io.polygons import PolygonSoup
@@ -67,7 +68,8 @@ def _from_vtk(mesh: Any) -> PolygonSoup:
     if numbered and any(BLOCK in getattr(block, "cell_data", {}) for _, block in blocks):
         numbered = False
         pieces.carried.remarks.append(f"left out the names of its blocks, whose cells have data {BLOCK!r}")
-    for number, (_, block) in enumerate(blocks):
+    start = int(bool(blocks) and _is_marks(blocks[0][1]))  # the label 0 of lines and vertices is the one for none
+    for number, (_, block) in enumerate(blocks, start):
         if not hasattr(block, "cast_to_unstructured_grid"):
             remarks.append(f"left out a block of type {type(block).__name__}, which has no cells")
             continue
@@ -85,9 +87,15 @@ def _from_vtk(mesh: Any) -> PolygonSoup:
             if not np.array_equal(fields.setdefault(key, values), values):
                 pieces.carried.remarks.append(f"left out field data {key!r} of further blocks")
     if numbered:
-        text = "\n".join(f"{k} {' '.join(name.split())}" for k, (name, _) in enumerate(blocks))
-        fields[NAMES_OF_REGIONS + BLOCK] = np.frombuffer(text.encode(), np.uint8)
+        text = "\n".join(f"{k} {' '.join(name.split())}" for k, (name, _) in enumerate(blocks, start))
+        for beginning in (NAMES_OF_POINT_REGIONS, NAMES_OF_FEATURE_REGIONS, NAMES_OF_REGIONS):
+            fields[beginning + BLOCK] = np.frombuffer(text.encode(), np.uint8)
     return pieces.soup({**fields, **_arrays(mesh.field_data)}, tuple(remarks))
+
+
+def _is_marks(block: Any) -> bool:
+    """Return whether a data set has only lines and vertices."""
+    return hasattr(block, "cast_to_unstructured_grid") and are_marks(block.cast_to_unstructured_grid().celltypes)
 
 
 def _blocks(mesh: Any, name: str = "") -> Iterator[tuple[str, Any]]:

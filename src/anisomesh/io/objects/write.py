@@ -16,7 +16,7 @@ from anisomesh.io.formats.gltf.read import MATERIAL, NODE
 from anisomesh.io.formats.gltf.write import glb_bytes
 from anisomesh.io.formats.gmsh.elements import PHYSICAL
 from anisomesh.io.formats.region_names import region_texts
-from anisomesh.io.formats.vtk.data import ORIGINAL_POINT
+from anisomesh.io.formats.vtk.data import ORIGINAL_POINT, blank_rows
 from anisomesh.io.formats.vtk.write import active_names, vtk_polygons
 from anisomesh.io.holding import (
     OF_FEATURES,
@@ -105,7 +105,7 @@ def to_meshio(mesh: Mesh) -> Any:
     losses.add("materials", *mesh.materials)
     losses.fixed_faces(mesh)
     blank = {
-        name: [values, *(_blank(values, len(kind.nodes)) for kind in kinds[1:])]
+        name: [values, *(blank_rows(values, len(kind.nodes)) for kind in kinds[1:])]
         for name, values in mesh.face_data.items()
     }
     result = meshio.Mesh(
@@ -243,12 +243,6 @@ def _trimesh_part(mesh: Mesh, chosen: Integers, material: Any) -> Any:
         visual=visual,
         process=False,
     )
-
-
-def _blank(values: Array, count: int) -> Array:
-    """Return rows for cells that have no value: NaN, 0 or empty."""
-    fill: Any = {"f": np.nan, "U": ""}.get(values.dtype.kind, 0)
-    return np.full((count, *values.shape[1:]), fill, dtype=values.dtype)
 
 
 def _warn(library: str, losses: Losses) -> None:

@@ -12,7 +12,7 @@ from anisomesh._arrays import Points
 from anisomesh.attributes.model import Mesh, Regions
 from anisomesh.io.carried import Array, Integers, separate_columns
 from anisomesh.io.formats.gmsh.data import COMMENT, UNLABELLED
-from anisomesh.io.formats.gmsh.elements import LINE, PHYSICAL, POINT, TRIANGLE, entities_of
+from anisomesh.io.formats.gmsh.elements import GEOMETRICAL, LINE, PHYSICAL, POINT, TRIANGLE, entities_of
 from anisomesh.io.formats.region_names import empty_regions, in_a_line, region_texts
 from anisomesh.io.holding import (
     EMPTY_REGIONS,
@@ -29,6 +29,7 @@ from anisomesh.io.holding import (
     numeric,
 )
 
+_TOO_LARGE_TAGS = "whose integers are too large for tags, which have 32 bits"
 _WIDTHS = (1, 3, 9)  # numbers of components that Gmsh knows
 
 
@@ -104,7 +105,8 @@ class _Marked(NamedTuple):
 def _marked(nodes: Integers, regions: Mapping[str, Regions], what: str, losses: Losses) -> _Marked:
     """Return features or fixed points with one division of them as physical groups."""
     usable = {name: division for name, division in regions.items() if fits_int32(division.labels)}
-    losses.add(what, *(name for name in regions if name not in usable))
+    for name in (name for name in regions if name not in usable):
+        losses.because(what, name, _TOO_LARGE_TAGS)
     division = held_division(usable, what, losses, PHYSICAL, with_names=True)
     if division is None:
         return _Marked(nodes, np.zeros(len(nodes), dtype=np.int64), {})
@@ -119,14 +121,18 @@ def _unused_number(labels: Integers) -> int:
 
 def _divisions(mesh: Mesh, losses: Losses) -> tuple[Regions | None, Integers, dict[str, Array]]:
     """Return the physical groups, the entities (F,), and other divisions as element data."""
-    usable = {}
+    usable, large = {}, dict[str, Regions]()
     for name, regions in mesh.regions.items():
         if fits_int32(regions.labels):
             usable[name] = regions
+        elif name in (PHYSICAL, GEOMETRICAL):
+            losses.because("regions", name, _TOO_LARGE_TAGS)
+        elif is_exact_in_float64(regions.labels):
+            large[name] = regions
         else:
-            losses.add("regions", name)
-    entities = usable.pop("geometrical", None)
-    found = main_division(usable, "physical")
+            losses.because("regions", name, TOO_LARGE)
+    entities = usable.pop(GEOMETRICAL, None)
+    found = main_division(usable, PHYSICAL)
     physical = None if found is None else usable.pop(found[0])
     if entities is not None:
         geometrical = entities.labels
@@ -134,7 +140,9 @@ def _divisions(mesh: Mesh, losses: Losses) -> tuple[Regions | None, Integers, di
         geometrical = entities_of(physical.labels)
     else:
         geometrical = np.ones(mesh.surface.n_faces, dtype=np.int64)
-    return physical, geometrical, {name: regions.labels for name, regions in usable.items()}
+    others = {name: regions.labels for name, regions in (usable | large).items()}
+    losses.add("regions", *(name for name in others if not name))
+    return physical, geometrical, {name: labels for name, labels in others.items() if name}
 
 
 def _elements(kind: int, nodes: Array, physical: Integers | int, entity: Integers | int, first: int) -> bytes:

@@ -38,8 +38,9 @@ def of_reals(name: str, reals: Array, *integers: Integers, types: tuple[int, ...
 
 
 def text_content(sections: Sequence[Rows]) -> bytes:
-    """Return a file of text of version 2."""
-    parts = [f"MeshVersionFormatted {_SHORT}\nDimension {SPACE}\n"]
+    """Return a file of text, of version 2 unless integers need 64 bits."""
+    version = _SHORT if _are_short(sections) else _LONG_INTEGERS
+    parts = [f"MeshVersionFormatted {version}\nDimension {SPACE}\n"]
     for name, reals, integers, types in sections:
         parts.append(f"{name}\n{len(reals)}\n")
         if types:
@@ -50,11 +51,16 @@ def text_content(sections: Sequence[Rows]) -> bytes:
     return "".join([*parts, f"{END}\n"]).encode()
 
 
+def _are_short(sections: Sequence[Rows]) -> bool:
+    """Return whether all integers have 32 bits."""
+    return all(fits_int32(rows.integers.ravel()) for rows in sections)
+
+
 def binary_content(sections: Sequence[Rows]) -> bytes:
     """Return a binary file, of version 2 unless positions or integers need 64 bits."""
     size = sum(64 + 8 * rows.reals.size + 4 * rows.integers.size for rows in sections)
     version = _SHORT if size <= _MOST_SHORT else _LONG_POSITIONS
-    if not all(fits_int32(rows.integers.ravel()) for rows in sections):
+    if not _are_short(sections):
         version = _LONG_INTEGERS
     position, integer = ("<i4" if version == _SHORT else "<i8"), ("<i8" if version == _LONG_INTEGERS else "<i4")
     parts, at = [np.array([1, version], dtype="<i4").tobytes()], 8

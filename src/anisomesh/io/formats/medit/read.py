@@ -3,11 +3,10 @@
 from __future__ import annotations
 
 import numpy as np
-import numpy.typing as npt
 
-from anisomesh.io.carried import NORMAL, Carried, Integers
+from anisomesh.io.carried import NORMAL, Array, Carried, Integers
 from anisomesh.io.cells import Shape, SurfaceCells
-from anisomesh.io.formats.medit.sections import PLANE, SPACE, Section, marks, read_sections, table
+from anisomesh.io.formats.medit.sections import SPACE, Section, marks, read_sections, table
 from anisomesh.io.formats.words import whole
 from anisomesh.io.polygons import PolygonSoup
 
@@ -43,16 +42,18 @@ def read_medit(data: bytes) -> PolygonSoup:
     References of vertices are point data, or a division of the fixed points if no other vertices have one.
     """
     dimension, sections, ends = read_sections(data)
-    points, cells = [np.zeros((0, 4))], SurfaceCells()
-    references, others = [np.zeros(0)], dict[str, Section]()
+    points, of_points, cells = [np.zeros((0, SPACE))], [np.zeros(0, dtype=np.int64)], SurfaceCells()
+    references, others = [np.zeros(0, dtype=np.int64)], dict[str, Section]()
     numbers: dict[str, list[Integers]] = {}  # of the cells of each section
     for section in sections:
         name = section.name
         if name == "Vertices":
-            points.append(np.insert(table(section, dimension, 1), [PLANE] * (SPACE - dimension), 0.0, axis=1))
+            coordinates, integers = table(section, dimension, 1)
+            points.append(np.pad(coordinates, ((0, 0), (0, SPACE - dimension))))
+            of_points.append(integers[:, 0])
         elif name in _SURFACES:
             shape, width = _SURFACES[name]
-            rows = table(section, 0, width + 1)
+            rows = table(section, 0, width + 1).integers
             numbers.setdefault(name, []).append(sum(map(len, references)) + np.arange(len(rows)))
             cells.add(shape, whole(rows[:, :width]) - 1, nodes_on_sides=width in _SECOND_ORDER)
             references.append(rows[:, width])
@@ -62,22 +63,21 @@ def read_medit(data: bytes) -> PolygonSoup:
             cells.ignore(name)
         else:
             others[name] = section
-    vertices = np.concatenate(points)
     required = {name: others.pop(name) for name in _MARKED_FACES if name in others}
-    carried = _carried(others, np.concatenate(references), vertices[:, SPACE], dimension)
+    carried = _carried(others, np.concatenate(references), np.concatenate(of_points), dimension)
     for name, section in required.items():
         with carried.optional(f"the section {name}"):
             of_section = np.concatenate(numbers.get(_MARKED_FACES[name], [np.zeros(0, dtype=np.int64)]))
             chosen = of_section[_within(marks(section), len(of_section))]
             carried.fixed_cells = np.concatenate([carried.fixed_cells, chosen])
     remarks = () if ends else ("it has no End after its sections; check that none is missing",)
-    return cells.soup(vertices[:, :SPACE], remarks, carried)
+    return cells.soup(np.concatenate(points), remarks, carried)
 
 
 def _carried(
     sections: dict[str, Section],
-    of_cells: npt.NDArray[np.float64],
-    of_points: npt.NDArray[np.float64],
+    of_cells: Array,
+    of_points: Array,
     dimension: int,
 ) -> Carried:
     """Return what the other sections and the references of cells and points give."""
@@ -102,8 +102,8 @@ def _carried(
         if "NormalAtVertices" in sections:
             if "Normals" not in sections:
                 raise ValueError("truncated: it has no section Normals")
-            normals = table(sections["Normals"], dimension, 0)
-            place = whole(table(sections["NormalAtVertices"], 0, 2)) - 1
+            normals = table(sections["Normals"], dimension, 0).reals
+            place = whole(table(sections["NormalAtVertices"], 0, 2).integers) - 1
             values = np.full((len(of_points), 3), np.nan)
             rows = np.pad(normals, ((0, 0), (0, SPACE - dimension)))
             values[_within(place[:, 0], len(values))] = rows[_within(place[:, 1], len(normals))]
@@ -121,7 +121,7 @@ def _take_edges(sections: dict[str, Section], carried: Carried) -> None:
     """Add the edges that are ridges, required or have a reference."""
     if "Edges" not in sections:
         return
-    rows = whole(table(sections["Edges"], 0, 3))
+    rows = whole(table(sections["Edges"], 0, 3).integers)
     chosen = rows[:, 2] != 0
     for name in _MARKED_EDGES:
         with carried.optional(f"the section {name}"):

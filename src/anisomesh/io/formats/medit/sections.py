@@ -84,6 +84,13 @@ _NAMES_BY_NUMBER = {code: name for name, code in KEYWORDS.items()}
 _LONG_POSITIONS, _LONG_INTEGERS = 3, 4  # first versions whose positions, and whose integers, have 64 bits
 
 
+class Numbers(NamedTuple):
+    """Rows of real numbers (n, k) and of integers (n, m); these are float64 if some are no integers of 64 bits."""
+
+    reals: npt.NDArray[np.float64]
+    integers: npt.NDArray[Any]
+
+
 class Section(Protocol):
     """A section of a file, whose numbers are read from the first one on."""
 
@@ -99,8 +106,8 @@ class Section(Protocol):
     def types(self, count: int) -> list[int]:
         """Return the next integers, which have 32 bits in any version."""
 
-    def rows(self, count: int, reals: int, integers: int) -> npt.NDArray[np.float64]:
-        """Return rows of real numbers and integers (count, reals + integers)."""
+    def rows(self, count: int, reals: int, integers: int) -> Numbers:
+        """Return rows of real numbers, with integers behind them."""
 
 
 class Sections(NamedTuple):
@@ -115,14 +122,14 @@ class Sections(NamedTuple):
         return next((section for section in reversed(self.sections) if section.name == name), None)
 
 
-def table(section: Section, reals: int, integers: int) -> npt.NDArray[np.float64]:
-    """Return the rows (n, reals + integers) of a section that begins with their number."""
+def table(section: Section, reals: int, integers: int) -> Numbers:
+    """Return the rows of a section that begins with their number."""
     return section.rows(section.count(), reals, integers)
 
 
 def marks(section: Section) -> Integers:
     """Return the numbers (n,), from 0, that a section lists."""
-    numbers: Integers = whole(table(section, 0, 1))[:, 0] - 1
+    numbers: Integers = whole(table(section, 0, 1).integers)[:, 0] - 1
     return numbers
 
 
@@ -167,13 +174,20 @@ class _Text:
         found: list[int] = whole(self._take(count)).tolist()
         return found
 
-    def rows(self, count: int, reals: int, integers: int) -> npt.NDArray[np.float64]:
+    def rows(self, count: int, reals: int, integers: int) -> Numbers:
         width = reals + integers
         if self.n_left < count * width:
             raise ValueError(
                 f"truncated: {self.name} declares {count} rows of {width} but {self.n_left} numbers follow"
             )
-        return self._take(count * width).reshape(count, width)
+        words = self._words[self._at : self._at + count * width]
+        self._at += len(words)
+        of_reals = [self._numbers(words[k::width]) for k in range(reals)]
+        of_integers = [self._integers(words[k::width]) for k in range(reals, width)]
+        return Numbers(
+            np.stack(of_reals, axis=1) if reals else np.zeros((count, 0)),
+            np.stack(of_integers, axis=1) if integers else np.zeros((count, 0), dtype=np.int64),
+        )
 
     def _take(self, count: int) -> npt.NDArray[np.float64]:
         if not 0 <= count <= self.n_left:
@@ -181,8 +195,17 @@ class _Text:
                 f"truncated: the section {self.name} has {self.n_left} numbers where {count} should follow"
             )
         self._at += count
+        return self._numbers(self._words[self._at - count : self._at])
+
+    def _integers(self, words: list[bytes]) -> npt.NDArray[Any]:
         try:
-            return np.array(list(map(float, self._words[self._at - count : self._at])), dtype=np.float64)
+            return np.array(list(map(int, words)), dtype=np.int64)
+        except (ValueError, OverflowError):
+            return self._numbers(words)
+
+    def _numbers(self, words: list[bytes]) -> npt.NDArray[np.float64]:
+        try:
+            return np.array(list(map(float, words)), dtype=np.float64)
         except ValueError as error:
             raise ValueError(f"malformed: the section {self.name} should give numbers: {error}") from None
 
@@ -229,10 +252,10 @@ class _Binary:
         found: list[int] = self._take(f"{self._layout.order}i4", count).tolist()
         return found
 
-    def rows(self, count: int, reals: int, integers: int) -> npt.NDArray[np.float64]:
+    def rows(self, count: int, reals: int, integers: int) -> Numbers:
         real = f"{self._layout.order}f{self._layout.real_bytes}"
         rows = self._take(np.dtype([("reals", real, (reals,)), ("integers", self._layout.integer, (integers,))]), count)
-        return np.concatenate([rows["reals"], rows["integers"]], axis=1, dtype=np.float64)
+        return Numbers(rows["reals"].astype(np.float64), rows["integers"].astype(np.int64))
 
     def _take(self, kind: npt.DTypeLike, count: int) -> npt.NDArray[Any]:
         dtype = np.dtype(kind)

@@ -60,7 +60,7 @@ def _fields(section: Section, dimension: int) -> list[Array]:
     width = sum(widths[kind] for kind in types)
     if count < 1:
         raise ValueError(f"truncated: {_SECTION} declares {count} rows")
-    rows = section.rows(count, width, 0)
+    rows = section.rows(count, width, 0).reals
     if section.n_left:
         raise ValueError(f"malformed: more than the {count} rows of {width} numbers that {_SECTION} declares follow")
     ends = np.cumsum([widths[kind] for kind in types])

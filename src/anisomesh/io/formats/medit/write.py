@@ -48,6 +48,9 @@ def _sections(mesh: Mesh, losses: Losses) -> list[Rows]:
     references = np.zeros(len(faces), dtype=np.int64) if found is None else found[1].labels
     point_data = {**mesh.point_data, **continuous_corner_data(mesh, losses)}
     given, normals = point_data.pop(REFERENCE, None), point_data.pop(NORMAL, None)
+    if given is not None and given.dtype.kind == "u" and given.max() > np.iinfo(np.int64).max:
+        losses.because("point data", REFERENCE, "whose integers are too large for int64")
+        given = None
     if given is not None and given.ndim == 1 and given.dtype.kind in "iub":
         vertices = given.astype(np.int64)
         losses.add(OF_FIXED_POINTS, *mesh.fixed_point_regions)  # whose place the point data take

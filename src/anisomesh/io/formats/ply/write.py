@@ -20,6 +20,7 @@ from anisomesh.io.holding import (
     narrowed,
     numeric,
     regions_as_integers,
+    without_unnamed,
 )
 
 _COLUMNS = {  # names of the columns of arrays, by name and width
@@ -43,6 +44,7 @@ def ply_bytes(mesh: Mesh, losses: Losses) -> bytes:
     lists of faces, features are the element ``edge``. Regions are integers of faces and edges, with their names in
     comments.
     """
+    mesh = without_unnamed(mesh, losses, divisions=True)
     surface = mesh.surface
     vertex = {name: surface.points[:, k] for k, name in enumerate("xyz")}
     _add_columns(vertex, numeric(mesh.point_data, "point data", losses), "point data", losses)

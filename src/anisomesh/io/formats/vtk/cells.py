@@ -31,6 +31,9 @@ _VTK_OTHERS = {
     **dict.fromkeys((15, 16, 41, 42), "polyhedron"),
 }
 
+MARKS = tuple(kind for kind, name in _VTK_OTHERS.items() if name in ("vertex", "line"))
+"""Types of cells that mark points and edges of a surface."""
+
 
 def add_vtk_cells(
     cells: SurfaceCells, types: npt.NDArray[Any], connectivity: npt.NDArray[Any], offsets: npt.NDArray[Any]

@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
-import re
 from collections.abc import Container, Mapping
+from typing import Any, NamedTuple
 from xml.etree.ElementTree import Element
 
 import numpy as np
 
 from anisomesh.io.carried import NORMAL, UV, Array, Carried
+from anisomesh.io.formats.region_names import label_of
 from anisomesh.io.formats.vtk.arrays import ArrayReader
 
 NAMES_OF_REGIONS = "regions of "
@@ -30,6 +31,18 @@ _MEANINGS = (  # attribute of the section, names of arrays in use, our name
 )
 
 
+class _Data(NamedTuple):
+    data: dict[str, Array]
+    n_rows: int
+    of_marks: bool
+
+
+def blank_rows(like: Array, count: int) -> Array:
+    """Return rows (count, ...) for cells that have no value, of the type of others: NaN, 0 or empty strings."""
+    fill: Any = {"f": np.nan, "U": ""}.get(like.dtype.kind, 0)
+    return np.full((count, *like.shape[1:]), fill, dtype=like.dtype)
+
+
 class DataOfPieces:
     """The data of one section, such as point data, of all pieces.
 
@@ -41,25 +54,45 @@ class DataOfPieces:
 
     def __init__(self, section: str) -> None:
         self._section = section
-        self._pieces: list[dict[str, Array]] = []
+        self._pieces: list[_Data] = []
 
     def add(self, data: dict[str, Array], count: int) -> None:
         """Add the data of a piece with a number of points or cells, unless it has none."""
         if count:
-            self._pieces.append(data)
+            self._pieces.append(_Data(data, count, of_marks=False))
+
+    def add_marks(self, data: dict[str, Array], count: int) -> None:
+        """Add the data of a piece of lines and vertices, with a number of cells, or of points that are not kept."""
+        self._pieces.append(_Data(data, count, of_marks=True))
+
+    @property
+    def of_marks(self) -> set[str]:
+        """Names of the data that only pieces of lines and vertices have."""
+        given = [{name for piece in self._pieces if piece.of_marks == kind for name in piece.data} for kind in (0, 1)]
+        return given[1] - given[0]
 
     def all(self, carried: Carried) -> dict[str, Array]:
-        """Return the arrays that every piece has; the others are left out with a remark."""
+        """Return the arrays that every piece has; the others are left out with a remark.
+
+        Pieces of lines and vertices need not have them, nor need other pieces have the ones of these: rows of 0, NaN or
+        empty strings stand for them.
+        """
         together: dict[str, Array] = {}
-        for name in dict.fromkeys(name for piece in self._pieces for name in piece):
-            parts = [piece[name] for piece in self._pieces if name in piece]
-            if len(parts) < len(self._pieces):
-                missing = len(self._pieces) - len(parts)
+        whole = [piece for piece in self._pieces if not piece.of_marks]
+        for name in dict.fromkeys(name for piece in self._pieces if piece.n_rows for name in piece.data):
+            lacking = sum(name not in piece.data for piece in whole)
+            if lacking > 0 and name not in self.of_marks:
                 carried.remarks.append(
-                    f"left out {self._section} {name!r}, which {missing} of {len(self._pieces)} pieces lack"
+                    f"left out {self._section} {name!r}, which {lacking} of {len(whole)} pieces lack"
                 )
                 continue
             with carried.optional(f"{self._section} {name!r}"):
+                like = next(piece.data[name] for piece in (*whole, *self._pieces) if name in piece.data)
+                parts = [
+                    blank_rows(like, piece.n_rows) if name not in piece.data else piece.data[name]
+                    for piece in self._pieces
+                    if piece.n_rows
+                ]
                 together[name] = np.concatenate(parts) if len(parts) > 1 else parts[0]
         return together
 
@@ -69,7 +102,11 @@ def read_section(piece: Element, section: str, arrays: ArrayReader, count: int, 
     found: dict[str, Array] = {}
     for element in piece.iterfind(f"{section}/*"):
         name = element.get("Name", "")
-        if count and element.tag in _ARRAY_TAGS and name:
+        if not count or element.tag not in _ARRAY_TAGS:
+            continue
+        if not name:
+            carried.remarks.append(f"left out {section} without a name")
+        else:
             with carried.optional(f"{section} {name!r}"):
                 found[name] = _rows(element, arrays, count)
     return found
@@ -89,7 +126,9 @@ def read_field_data(root: Element, kind: str, arrays: ArrayReader, carried: Carr
     found: dict[str, Array] = {}
     for element in root.iterfind(f"{kind}/FieldData/*"):
         name = element.get("Name", "")
-        if element.tag in _ARRAY_TAGS and name:
+        if element.tag in _ARRAY_TAGS and not name:
+            carried.remarks.append("left out FieldData without a name")
+        elif element.tag in _ARRAY_TAGS:
             with carried.optional(f"FieldData {name!r}"):
                 values, width = arrays.read(element), element.get("NumberOfComponents", "1")
                 found[name] = values.reshape((-1, int(width)) if width.isdigit() and int(width) > 1 else (-1,))
@@ -120,11 +159,12 @@ def names_of_regions(fields: dict[str, Array], carried: Carried) -> list[dict[st
 def _labels(text: str) -> dict[int, str]:
     found = {}
     for line in text.split("\n"):
-        match = re.fullmatch(r"(-?\d{1,18})(?: (.*))?", line, re.DOTALL)
-        if match is None:
+        digits, _, name = line.partition(" ")
+        label = label_of(digits)
+        if label is None:
             raise ValueError(f"{line[:40]!r} is not a label and its name")
-        if match[2]:
-            found[int(match[1])] = match[2]
+        if name:
+            found[label] = name
     return found
 
 

@@ -14,6 +14,7 @@ from anisomesh.io.cells import SurfaceCells
 from anisomesh.io.formats.region_names import also_named
 from anisomesh.io.formats.vtk.cells import add_vtk_cells, add_vtk_lines
 from anisomesh.io.formats.vtk.data import ORIGINAL_POINT, DataOfPieces, names_by_meaning, names_of_regions
+from anisomesh.io.formats.vtk.marks import Marks, are_marks
 from anisomesh.io.polygons import Integers, PolygonSoup
 
 # Bits of the array vtkGhostType: https://vtk.org/doc/nightly/html/classvtkDataSetAttributes.html.
@@ -42,7 +43,8 @@ class Pieces:
 
     Notes
     -----
-    Lines are features, vertices are fixed points. Cells that are copies of cells of other pieces, or hidden, are left
+    Lines are features, vertices are fixed points, also in pieces of their own, at the points of other pieces that have
+    the same coordinates. Cells that are copies of cells of other pieces, or hidden, are left
     out. Points with the same global number and the same coordinates are one.
     """
 
@@ -50,6 +52,7 @@ class Pieces:
         self.carried = Carried()
         self._cells = SurfaceCells()
         self._points: list[npt.NDArray[np.float64]] = [np.zeros((0, 3))]
+        self._marks = Marks()
         self._n_points = self._n_copies = self._n_hidden = 0
         self._point_data, self._cell_data = DataOfPieces("PointData"), DataOfPieces("CellData")
         self._ours: dict[str, str] = {}
@@ -57,16 +60,22 @@ class Pieces:
 
     def add(self, piece: Piece) -> None:
         """Add a piece; ValueError if a cell is malformed or refers to a point that there is not."""
-        first = self._n_points
-        self._points.append(np.asarray(piece.points, dtype=np.float64).reshape(-1, 3))
-        self._n_points += len(self._points[-1])
+        points = np.asarray(piece.points, dtype=np.float64).reshape(-1, 3)
         self._ours |= names_by_meaning(piece.active, piece.point_data)
         self._numbers = piece.active.get("GlobalIds", "") or self._numbers
         piece = self._without_ghosts(piece)
-        connectivity = _shifted(piece.connectivity, first, self._n_points)
+        first = 0 if are_marks(piece.types) else self._n_points
+        connectivity = _shifted(piece.connectivity, first, first + len(points))
         numbers = add_vtk_cells(self._cells, piece.types, connectivity, piece.offsets)
+        if are_marks(piece.types):
+            self._marks.add(points, piece.types, connectivity, piece.offsets, numbers)
+            self._cell_data.add_marks(piece.cell_data, len(piece.types))
+            self._point_data.add_marks(piece.point_data, 0)
+            return
         add_vtk_lines(self.carried, piece.types, connectivity, piece.offsets, numbers)
-        self._point_data.add(piece.point_data, self._n_points - first)
+        self._points.append(points)
+        self._n_points += len(points)
+        self._point_data.add(piece.point_data, len(points))
         self._cell_data.add(piece.cell_data, len(piece.types))
 
     def _without_ghosts(self, piece: Piece) -> Piece:
@@ -103,13 +112,21 @@ class Pieces:
     def soup(self, fields: dict[str, Array], remarks: tuple[str, ...] = ()) -> PolygonSoup:
         """Return everything, with field data by name."""
         carried = self.carried
+        self._marks.place(self._points, carried)
         names = names_of_regions(fields, carried)
         for name, texts in (pair for of in names for pair in of.items()):
             also_named(carried, name, texts.values())
+        for name in self._point_data.of_marks:
+            carried.remarks.append(f"left out PointData {name!r} of lines and vertices")
         for name, values in self._point_data.all(carried).items():
             carried.point_data[self._ours.get(name, name)] = values
         for name, values in self._cell_data.all(carried).items():
             carried.add_data_of_all_cells(name, values, [of.get(name) for of in names])
+            if name in self._cell_data.of_marks:
+                divided = name in carried.lines.divisions or name in carried.fixed_points.divisions
+                carried.divisions.pop(name, None)
+                if carried.cell_data.pop(name, None) is not None and not divided:
+                    carried.remarks.append(f"left out CellData {name!r} of lines and vertices")
         for count, what in ((self._n_copies, "ghosts, which are copies of others"), (self._n_hidden, "hidden")):
             remarks += (f"left out {count} cell(s) marked as {what}",) if count else ()
         soup = self._cells.soup(np.concatenate(self._points), remarks, carried)

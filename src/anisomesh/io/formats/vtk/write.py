@@ -21,6 +21,7 @@ from anisomesh.io.formats.vtk.data import (
     NAMES_OF_POINT_REGIONS,
     NAMES_OF_REGIONS,
     ORIGINAL_POINT,
+    blank_rows,
 )
 from anisomesh.io.holding import (
     OF_FEATURES,
@@ -31,6 +32,7 @@ from anisomesh.io.holding import (
     narrowed,
     numeric,
     with_points_repeated,
+    without_unnamed,
 )
 from anisomesh.io.polygons import Integers
 
@@ -46,6 +48,7 @@ def vtu_mesh_bytes(mesh: Mesh, losses: Losses) -> bytes:
     -----
     Regions are cell data, with their names in field data. Cell data of lines and vertices are NaN, 0 or empty.
     """
+    mesh = without_unnamed(mesh, losses, divisions=True)
     points, faces = mesh.surface.points, mesh.surface.faces
     lines, vertices = mesh.features, mesh.fixed_points
     sizes = np.repeat([3, 2, 1], [len(faces), len(lines), len(vertices)])
@@ -83,7 +86,7 @@ class Polygons(NamedTuple):
 
 def vtk_polygons(mesh: Mesh, losses: Losses) -> tuple[Mesh, Polygons]:
     """Return a mesh with points repeated where corner data differ, and its cells and data for polygon data of VTK."""
-    mesh, source = with_points_repeated(mesh)
+    mesh, source = with_points_repeated(without_unnamed(mesh, losses, divisions=True))
     if len(np.unique(source)) < len(source):
         mesh = replace(mesh, point_data={**mesh.point_data, ORIGINAL_POINT: source})
     found = {"Verts": mesh.fixed_points[:, None], "Lines": mesh.features, "Polys": mesh.surface.faces}
@@ -129,6 +132,9 @@ def _data(
 
 def _storable(data: Mapping[str, Array], what: str, losses: Losses) -> dict[str, Array]:
     """Return arrays of numbers and strings as rows."""
+    if "" in data:
+        losses.add(what, "")
+        data = {name: values for name, values in data.items() if name}
     strings = {name: values.astype(np.str_) for name, values in data.items() if values.dtype.kind in "SU"}
     strings = {name: values for name, values in strings.items() if values.ndim == 1 and values.size}
     numbers = numeric({name: values for name, values in data.items() if name not in strings}, what, losses)
@@ -145,12 +151,7 @@ def _names(division: Regions, losses: Losses) -> Array:
 
 def _padded(values: Array, order: Sequence[str], counts: Mapping[str, int]) -> Array:
     """Return an array of faces with rows of NaN, 0 or empty strings for lines and vertices."""
-    fill: Any = {"f": np.nan, "U": ""}.get(values.dtype.kind, 0)
-    rows = [
-        values if kind == "faces" else np.full((counts[kind], *values.shape[1:]), fill, dtype=values.dtype)
-        for kind in order
-    ]
-    return np.concatenate(rows)
+    return np.concatenate([values if kind == "faces" else blank_rows(values, counts[kind]) for kind in order])
 
 
 def vtu_bytes(
