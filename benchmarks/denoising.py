@@ -2,9 +2,9 @@
 
 Usage: python benchmarks/denoising.py [--pairs FOLDER] [--items DATASET] [--filter WEIGHTS] [--limit 40]
 
---pairs: meshes NAME-clean.ply, NAME-noisy.SIZE.ply with the same faces, and results of others NAME-noisy.SIZE-OTHER.ply.
---items: the validation items of a data set, with noise of each size and kind. "Network + bilateral" and "network +
-learnt" are the two filters of normals behind the network; the second one's weights can be given.
+--pairs: meshes NAME-clean.ply and NAME-noisy.SIZE.ply with the same faces, and published results for them, named
+NAME-noisy.SIZE-OTHER.ply. --items: the validation items of a data set, with noise of each size and kind. "Network +
+bilateral" and "network + learnt" are two filters of normals behind the network; --filter gives weights of the second.
 """
 
 from __future__ import annotations
@@ -25,7 +25,7 @@ from anisomesh.learn.data.manifest import files_of
 from anisomesh.learn.graphs.faces import FILTER_ROUNDS, NORMAL_WIDTH
 from anisomesh.learn.inference.normals import NormalFilterInference
 from anisomesh.learn.inference.predict import moved_by_network
-from anisomesh.learn.inference.pretrained import weights_path
+from anisomesh.learn.inference.pretrained import NORMAL_FILTER, weights_path
 from anisomesh.learn.weights_file import read_weights
 from anisomesh.mesh.closest_points import ClosestPoints
 from anisomesh.mesh.geometry import unit_frame
@@ -35,24 +35,25 @@ SIZES = (0.1, 0.3, 0.5)
 Ways = dict[str, Callable[[Surface], Surface]]
 
 
-def ways(weights: Path | None) -> Ways:
+def ways(weights: Path) -> Ways:
     """Return the ways to remove noise by their names."""
+    known = read_weights(weights)
+    learnt = NormalFilterInference(known.options, known.arrays)
 
     def bilateral(noisy: Surface) -> Surface:
         moved = moved_by_network(noisy)
         return moved if moved is noisy else bilateral_filtered(moved, rounds=FILTER_ROUNDS, normal_width=NORMAL_WIDTH)
 
-    found: Ways = {"noisy": lambda noisy: noisy, "classical": classically_denoised, "network + bilateral": bilateral}
-    if weights is not None:
-        known = read_weights(weights)
-        learnt = NormalFilterInference(known.options, known.arrays)
+    def filtered(noisy: Surface) -> Surface:
+        moved = moved_by_network(noisy)
+        return moved if moved is noisy else learnt(noisy, moved)
 
-        def filtered(noisy: Surface) -> Surface:
-            moved = moved_by_network(noisy)
-            return moved if moved is noisy else learnt(noisy, moved)
-
-        found["network + learnt"] = filtered
-    return found
+    return {
+        "noisy": lambda noisy: noisy,
+        "classical": classically_denoised,
+        "network + bilateral": bilateral,
+        "network + learnt": filtered,
+    }
 
 
 def errors(denoised: Surface, clean: Surface) -> tuple[float, float]:
@@ -63,12 +64,8 @@ def errors(denoised: Surface, clean: Surface) -> tuple[float, float]:
     return angle, float(np.sqrt(squared.mean()) / clean.edge_lengths.mean())
 
 
-def unit(surface: Surface) -> Surface:
-    return surface.with_points(unit_frame(surface.points).to_unit(surface.points))
-
-
 def of_pairs(folder: Path, known: Ways) -> None:
-    """Print the errors of each pair of a folder, and of the results of others."""
+    """Print the errors of each pair of a folder, and of published results."""
     print(f"| mesh | {' | '.join(known)} | published |\n|---|{'---|' * (len(known) + 1)}")
     for path in sorted(folder.glob("*-noisy.*.ply")):
         if path.stem.count("-") > 2:
@@ -102,7 +99,7 @@ def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--pairs", type=Path)
     parser.add_argument("--items", type=Path)
-    parser.add_argument("--filter", type=Path)
+    parser.add_argument("--filter", type=Path, default=weights_path(NORMAL_FILTER))
     parser.add_argument("--limit", type=int, default=40, help="of validation items")
     args = parser.parse_args()
     known = ways(args.filter)

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from anisomesh._arrays import FaceVectors
+from anisomesh._arrays import FaceScalars, FaceVectors
 from anisomesh.denoise.filters import FaceNeighbours, bilateral_normals
 from anisomesh.learn.graphs.graph import Floats, Graph
 from anisomesh.mesh.surface import Surface
@@ -63,10 +63,8 @@ def face_graph(noisy: Surface, surface: Surface) -> FaceGraph:
     )
 
 
-def _face_features(
-    noisy: Surface, surface: Surface, normals: tuple[FaceVectors, ...], areas: np.ndarray
-) -> Floats:
-    """Return how far the normal of each face was turned and would be filtered, its size, and how far its points moved."""
+def _face_features(noisy: Surface, surface: Surface, normals: tuple[FaceVectors, ...], areas: FaceScalars) -> Floats:
+    """Return how far the normal of each face was and would be rotated, its size, and how far its points moved."""
     now, before, filtered = normals
     moved = (surface.points - noisy.points) / noisy.edge_lengths.mean()
     heights = np.einsum("fkx,fx->fk", moved[surface.faces], now)
@@ -82,7 +80,7 @@ def _face_features(
 
 
 def _pair_features(
-    surface: Surface, neighbours: FaceNeighbours, normals: tuple[FaceVectors, ...], areas: np.ndarray
+    surface: Surface, neighbours: FaceNeighbours, normals: tuple[FaceVectors, ...], areas: FaceScalars
 ) -> Floats:
     """Return how the normals of each pair differ, how it is bent and apart, and how many points it shares."""
     face, other, (now, _, filtered) = neighbours.face, neighbours.neighbour, normals

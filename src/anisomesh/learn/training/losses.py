@@ -1,4 +1,4 @@
-"""Losses of embeddings (dot products and Laplacian as in the paper, and others), of line fields, offsets and normals."""
+"""Losses of embeddings (dot products and Laplacian as in the paper, and others), line fields, offsets and normals."""
 
 from __future__ import annotations
 

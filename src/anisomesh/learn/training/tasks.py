@@ -39,7 +39,7 @@ VALIDATION_NOISE = (0.0, 0.3)
 """Standard deviations of noise in the validation of the networks for metrics, in mean edge lengths."""
 
 _OFFSET_WEIGHT = 2.0  # heuristic: weight of the loss of offsets; the loss of line fields has weight 1
-_MOVE_WEIGHT, _FILTERED_WEIGHT, _ROUND_WEIGHT = 1.0, 0.5, 0.25  # heuristic: offsets; normals of the last round and of all
+_MOVE_WEIGHT, _FILTERED_WEIGHT, _ROUND_WEIGHT = 1.0, 0.5, 0.25  # heuristic: offsets; normals, last and all
 _QUARTER_TURN = np.array([[0.0, -1.0, 0.0], [1.0, 0.0, 0.0], [0.0, 0.0, 1.0]])  # about the z axis
 
 Losses = dict[str, Tensor]
@@ -92,7 +92,7 @@ class StretchTask:
     """Line field and offsets of the default network, which needs no augmentation by rotations as it is equivariant."""
 
     copies = 1
-    validation_noise = VALIDATION_NOISE
+    validation_noise: tuple[float, ...] = VALIDATION_NOISE
 
     def __init__(self, options: TrainingOptions) -> None:
         assert isinstance(options.network, NetworkOptions)
@@ -145,7 +145,7 @@ class FilterTask:
     """The filter of normals, behind the pretrained default network; it is compared with the bilateral filter."""
 
     copies = 1
-    validation_noise = (0.1, 0.3, 0.5)
+    validation_noise: tuple[float, ...] = (0.1, 0.3, 0.5)
 
     def __init__(self, options: TrainingOptions) -> None:
         assert isinstance(options.network, FilterOptions)
@@ -197,7 +197,7 @@ def _normals_of(points: Tensor, faces: Tensor) -> Tensor:
 class EmbeddingTask:
     """Extra coordinates of the paper's network, with its losses and its augmentation by rotations and mirrors."""
 
-    validation_noise = VALIDATION_NOISE
+    validation_noise: tuple[float, ...] = VALIDATION_NOISE
 
     def __init__(self, options: TrainingOptions) -> None:
         assert isinstance(options.network, PaperOptions)
