@@ -42,6 +42,7 @@ def figures(seed: int) -> dict[tuple[float, str], tuple[float, float]]:
         methods = {
             "direct": {"embedding": "direct"},
             "exact metric": {"metric": tensors},
+            "filtered": {"embedding": "filtered"},
             "neural": {"embedding": "neural"},
             "hybrid": {"embedding": "hybrid"},
         }

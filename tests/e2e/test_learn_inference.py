@@ -16,7 +16,7 @@ from anisomesh.learn.architecture import NetworkOptions
 from anisomesh.learn.inference.predict import NOISE_FLOOR, predict
 from anisomesh.learn.inference.pretrained import pretrained_networks, weights_path
 from anisomesh.learn.inference.stretch import StretchInference
-from anisomesh.learn.weights_file import read_weights
+from anisomesh.learn.weights_file import WeightsError, read_weights
 from anisomesh.mesh.surface import Surface
 from anisomesh.repair.prepare import prepare
 from anisomesh.shapes.analytic import box, ellipsoid, sphere, torus, twisted_ring
@@ -147,7 +147,7 @@ class FixedNetwork(StretchInference):
 def test_the_share_of_noise_that_is_removed_grows_evenly(egg, monkeypatch, height, share):
     """Regression: noise of 0.0500 on a clean mesh was removed in full, which inverted 204 triangles."""
     network = FixedNetwork(height * egg.edge_lengths.mean())
-    monkeypatch.setattr("anisomesh.learn.inference.predict.bilateral_filtered", lambda surface, **given: surface)
+    monkeypatch.setattr("anisomesh.learn.inference.predict._normal_filter", lambda *given: lambda noisy, moved: moved)
     monkeypatch.setattr("anisomesh.learn.inference.predict._network", lambda *given: network)
     found = predict(egg)
     moved = np.linalg.norm(found.points - egg.points, axis=1) / egg.edge_lengths.mean()
@@ -218,6 +218,12 @@ def test_the_hybrid_metric_is_between_the_two(egg):
     }
     low, high = sorted([means["direct"], means["neural"]])
     assert low - 0.05 < means["hybrid"] < high + 0.05
+
+
+def test_weights_of_a_network_and_of_a_filter_are_not_taken_for_each_other(egg):
+    for given in ({"weights": "filter"}, {"normal_filter": "default"}):
+        with pytest.raises(WeightsError, match="filter of normals"):
+            predict(with_noise(egg, 0.3, np.random.default_rng(0)), **given)
 
 
 def test_missing_weights_and_devices_are_refused(egg, tmp_path):

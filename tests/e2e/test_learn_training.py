@@ -24,7 +24,7 @@ from anisomesh.bench.training import train_networks  # noqa: E402
 from anisomesh.cli.main import main  # noqa: E402
 from anisomesh.errors import OptionError  # noqa: E402
 from anisomesh.features.detect import WEAK_ANGLE, sharp_edges  # noqa: E402
-from anisomesh.learn.architecture import NetworkOptions, PaperOptions  # noqa: E402
+from anisomesh.learn.architecture import FilterOptions, NetworkOptions, PaperOptions  # noqa: E402
 from anisomesh.learn.data.items import load_item  # noqa: E402
 from anisomesh.learn.data.manifest import ItemFiles, files_of  # noqa: E402
 from anisomesh.learn.inference.predict import predict  # noqa: E402
@@ -235,6 +235,7 @@ def test_moments_are_restored_to_their_parameters_where_some_have_none(tmp_path)
         (PaperOptions, {"channels": 0}),
         (PaperOptions, {"skip": "none"}),
         (PaperOptions, {"norm": "layer"}),
+        (FilterOptions, {"rounds": 0}),
     ],
 )
 def test_invalid_network_sizes_are_refused(kind, sizes):
@@ -321,7 +322,7 @@ CONFIG = (
         (CONFIG.replace('out = "run"', ""), "out is missing"),
         ("network = 3\n" + CONFIG.split("[network]")[0], "expected a table"),
         ("nonsense", "not valid TOML"),
-        (CONFIG + "[paper]\nchannels = 8\n", "either"),
+        (CONFIG + "[paper]\nchannels = 8\n", r"only one of \[network\], \[paper\]"),
         (CONFIG.replace("epochs", 'loss = "l3"\nepochs'), "loss = 'l3'; expected one of dot, l2, cosine"),
         (CONFIG.replace("epochs", 'gauge = "round"\nepochs'), "gauge = 'round'; expected one of aligned, raw"),
         (CONFIG.replace("epochs", "augment = 1\nepochs"), "augment = 1; expected bool"),

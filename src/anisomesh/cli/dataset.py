@@ -52,7 +52,10 @@ def build_command(
     no_variants: Annotated[bool, typer.Option("--no-variants", help="Even meshes only.")] = False,
     evening: Annotated[
         EveningName,
-        typer.Option(help="How to make meshes even. cvt: uniform remesh; tetwild: pytetwild, then a uniform remesh."),
+        typer.Option(
+            help="How to make meshes even. cvt: uniform remesh; tetwild: pytetwild, then a uniform remesh; "
+            "working: only bad triangles are made anew."
+        ),
     ] = DEFAULT_RECIPE.evening,
     validation: Annotated[
         float, typer.Option(min=0.0, max=0.9, help="Share of the shape families for validation.")

@@ -104,3 +104,27 @@ class PaperOptions:
         for name, known in (("skip", SKIPS), ("norm", NORMS)):
             if getattr(self, name) not in known:
                 raise OptionError(f"[paper] {name} = {getattr(self, name)!r}; expected one of {', '.join(known)}")
+
+
+@dataclass(frozen=True, kw_only=True)
+class FilterOptions:
+    """Sizes of the learnt filter of normals.
+
+    Attributes
+    ----------
+    channels
+        Channels of a face.
+    blocks
+        Residual blocks.
+    rounds
+        Number of times that the normals are filtered.
+    """
+
+    channels: int = 48
+    blocks: int = 4
+    rounds: int = 8
+
+    def __post_init__(self) -> None:
+        for name in ("channels", "blocks", "rounds"):
+            if not isinstance(getattr(self, name), int) or getattr(self, name) < 1:
+                raise OptionError(f"[filter] {name} = {getattr(self, name)}; expected at least 1")

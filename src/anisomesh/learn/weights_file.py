@@ -11,7 +11,7 @@ import numpy as np
 import numpy.typing as npt
 
 from anisomesh.errors import AnisomeshError, OptionError
-from anisomesh.learn.architecture import NetworkOptions, PaperOptions
+from anisomesh.learn.architecture import FilterOptions, NetworkOptions, PaperOptions
 
 _DTYPES: dict[str, np.dtype[Any]] = {
     "F32": np.dtype("<f4"),
@@ -20,9 +20,10 @@ _DTYPES: dict[str, np.dtype[Any]] = {
     "I64": np.dtype("<i8"),
 }
 
-OPTIONS_OF_KIND: dict[str, type[NetworkOptions] | type[PaperOptions]] = {
+OPTIONS_OF_KIND: dict[str, type[NetworkOptions] | type[PaperOptions] | type[FilterOptions]] = {
     "default": NetworkOptions,
     "paper": PaperOptions,
+    "filter": FilterOptions,
 }
 """Class of the options for each kind of network in a file of weights."""
 
@@ -48,7 +49,7 @@ class Weights:
         Facts about the training.
     """
 
-    options: NetworkOptions | PaperOptions
+    options: NetworkOptions | PaperOptions | FilterOptions
     arrays: dict[str, npt.NDArray[Any]]
     facts: dict[str, Any]
 

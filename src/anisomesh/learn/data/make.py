@@ -138,8 +138,14 @@ def even_mesh(surface: Surface, recipe: Recipe, remesher: Remesher) -> Surface:
     Raises
     ------
     UnsuitableError
-        If there is no such mesh without inverted triangles.
+        If there is no such mesh without inverted triangles, or, for a working surface, its triangles are bad or
+        too many.
     """
+    if recipe.evening == "working":
+        working = _working_mesh(surface, recipe.target)
+        if working.n_points > _MAX_INPUT_COUNT * recipe.target or _regularity(working) < _MIN_INPUT_REGULARITY:
+            raise UnsuitableError(f"{working.n_points:,} points with a regularity of {_regularity(working):.2f}")
+        return working
     low, high = (share * recipe.target for share in _EVEN_COUNT_RANGE)
     if low <= surface.n_points <= high and _regularity(surface) >= _MIN_EVEN_REGULARITY:
         return surface
@@ -197,13 +203,18 @@ def _input_items(surface: Surface, recipe: Recipe, rng: np.random.Generator) -> 
         return []
     surface = _in_unit_frame(surface)
     n_sites = round(surface.n_points * np.exp(rng.uniform(*np.log(_SITE_RANGE))))
-    none = np.zeros(len(surface.edges), dtype=bool)
-    working = working_surface(surface, n_sites, creases=none, tagged=none).surface
+    working = _working_mesh(surface, n_sites)
     if working.n_points > _MAX_INPUT_COUNT * recipe.target:
         return []
     curvature = principal_curvatures(working)
     item = _item_on("given", working, lambda mesh: (curvature_metric(mesh, curvature), curvature.trusted), recipe)
     return [item] if item.facts["residual"] <= recipe.max_residual else []
+
+
+def _working_mesh(surface: Surface, n_sites: int) -> Surface:
+    """Return a surface as a remesh to a number of sites works on it."""
+    none = np.zeros(len(surface.edges), dtype=bool)
+    return working_surface(surface, n_sites, creases=none, tagged=none).surface
 
 
 def _in_unit_frame(surface: Surface) -> Surface:

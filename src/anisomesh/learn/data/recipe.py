@@ -8,7 +8,7 @@ from typing import Literal, get_args
 from anisomesh.errors import OptionError
 
 VariantName = Literal["given", "decimated", "stretched"]
-EveningName = Literal["cvt", "tetwild"]
+EveningName = Literal["cvt", "tetwild", "working"]
 VARIANTS: tuple[VariantName, ...] = get_args(VariantName)
 EVENINGS: tuple[EveningName, ...] = get_args(EveningName)
 
@@ -26,8 +26,9 @@ class Recipe:
         enough; ``"decimated"``, by quadric edge collapses, with irregular triangles; ``"stretched"``, with triangles
         stretched in a random direction that is unrelated to the curvature.
     evening
-        How an input mesh is made even unless it is: ``"cvt"``, a remesh with the uniform metric, or ``"tetwild"``, the
-        same on the boundary of pytetwild's tetrahedral mesh (the preparation of the paper).
+        How an input mesh is made even unless it is: ``"cvt"``, a remesh with the uniform metric, ``"tetwild"``, the
+        same on the boundary of pytetwild's tetrahedral mesh (the preparation of the paper), or ``"working"``: only bad
+        triangles are made anew and long edges split, as for a remesh.
     max_residual
         Largest relative residual of the direct embedding.
     min_stretch

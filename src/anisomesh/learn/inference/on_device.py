@@ -16,6 +16,7 @@ from anisomesh.learn.models.checkpoint import load_weights
 from anisomesh.learn.models.device import deterministic, resolve_device
 from anisomesh.learn.models.paper import PaperNetwork, paper_input
 from anisomesh.learn.models.stretch import StretchNetwork
+from anisomesh.learn.weights_file import WeightsError
 from anisomesh.mesh.surface import Surface
 
 
@@ -58,7 +59,11 @@ def network_on(path: Path, device: str) -> StretchOnDevice | PaperOnDevice:
         If the device does not exist or cannot be used.
     """
     network = load_weights(path)[0].to(resolve_device(device)).eval()
-    return StretchOnDevice(network) if isinstance(network, StretchNetwork) else PaperOnDevice(network)
+    if isinstance(network, StretchNetwork):
+        return StretchOnDevice(network)
+    if isinstance(network, PaperNetwork):
+        return PaperOnDevice(network)
+    raise WeightsError(f"{path}: holds a filter of normals, not a network")
 
 
 @contextmanager

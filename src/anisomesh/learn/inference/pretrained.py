@@ -8,13 +8,18 @@ from pathlib import Path
 from anisomesh.errors import OptionError, missing_folder
 from anisomesh.toml import hint
 
-DEFAULT_NETWORK = "default"
+DEFAULT_NETWORK, NORMAL_FILTER = "default", "filter"
 _WEIGHTS_FOLDER = Path(__file__).parents[1] / "weights"
+
+
+def pretrained_weights() -> list[str]:
+    """Return the names of all pretrained weights: of the networks, and of the filter of normals."""
+    return sorted(path.stem for path in _WEIGHTS_FOLDER.glob("*.safetensors"))
 
 
 def pretrained_networks() -> list[str]:
     """Return the names of the pretrained networks."""
-    return sorted(path.stem for path in _WEIGHTS_FOLDER.glob("*.safetensors"))
+    return [name for name in pretrained_weights() if name != NORMAL_FILTER]
 
 
 def pretrained_configurations() -> list[str]:
@@ -28,7 +33,7 @@ def configuration_path(name: str) -> Path:
 
 
 def weights_path(weights: str | os.PathLike[str] | None) -> Path:
-    """Return the file of weights for the name of a pretrained network, a path, or None for the default network.
+    """Return the file of weights for the name of pretrained ones, a path, or None for the default network.
 
     Raises
     ------
@@ -37,7 +42,7 @@ def weights_path(weights: str | os.PathLike[str] | None) -> Path:
     """
     name = DEFAULT_NETWORK if weights is None else os.fspath(weights)
     known = pretrained_networks()
-    path = _WEIGHTS_FOLDER / f"{name}.safetensors" if name in known else Path(name)
+    path = _WEIGHTS_FOLDER / f"{name}.safetensors" if name in pretrained_weights() else Path(name)
     if not path.is_file():
         folder = missing_folder(path)
         missing = f"; the folder {folder} does not exist" if folder else ""

@@ -42,9 +42,11 @@ def stretch_shapes(options: NetworkOptions) -> Shapes:
     """Return the shapes of the arrays of the network."""
     c, shapes = options.channels, linear_shapes("rise", options.channels, N_NORMAL_LEVELS)
     for k in range(options.scales):
-        shapes |= linear_shapes(f"enter.{k}", N_NODE_FEATURES, c) | _block_shapes(f"down.{k}", options)
+        shapes |= linear_shapes(f"enter.{k}", N_NODE_FEATURES, c)
+        shapes |= block_shapes(f"down.{k}", options.blocks, c, N_EDGE_FEATURES)
     for k in range(options.scales - 1):
-        shapes |= linear_shapes(f"join.{k}", 2 * c, c) | _block_shapes(f"up.{k}", options)
+        shapes |= linear_shapes(f"join.{k}", 2 * c, c)
+        shapes |= block_shapes(f"up.{k}", options.blocks, c, N_EDGE_FEATURES)
     for k in range(options.heads):
         head, of_nodes = f"heads.{k}", (2 + HEAD_ROUNDS) * HEAD_LINES
         shapes |= linear_shapes(f"{head}.start", c, HEAD_WIDTH)
@@ -55,14 +57,33 @@ def stretch_shapes(options: NetworkOptions) -> Shapes:
     return shapes
 
 
-def _block_shapes(name: str, options: NetworkOptions) -> Shapes:
-    c, shapes = options.channels, Shapes()
-    for k in range(options.blocks):
+def block_shapes(name: str, count: int, channels: int, edge_features: int) -> Shapes:
+    """Return the shapes of the arrays of residual blocks."""
+    c, shapes = channels, Shapes()
+    for k in range(count):
         convolution = f"{name}.{k}.convolution"
-        shapes |= {f"{convolution}.along": (N_EDGE_FEATURES, c)} | norm_shapes(f"{name}.{k}.norm", c)
+        shapes |= {f"{convolution}.along": (edge_features, c)} | norm_shapes(f"{name}.{k}.norm", c)
         shapes |= linear_shapes(f"{convolution}.sent", c, c, bias=False) | linear_shapes(f"{convolution}.own", c, c)
         shapes |= linear_shapes(f"{convolution}.out", 2 * c, c) | linear_shapes(f"{name}.{k}.out", c, c)
     return shapes
+
+
+def blocks(layers: Layers, name: str, count: int, x: Floats, graph: Graph) -> Floats:
+    """Return (V, C) after residual blocks: x + linear(leaky(norm(convolution(x))))."""
+    for k in range(count):
+        block = f"{name}.{k}"
+        inner = leaky(layers.mesh_norm(f"{block}.norm", _convolution(layers, f"{block}.convolution", x, graph)))
+        x = layers.linear(f"{block}.out", inner) + x
+    return x
+
+
+def _convolution(layers: Layers, name: str, x: Floats, graph: Graph) -> Floats:
+    """Return (V, C): a map of the features and the mean of the messages from the neighbours."""
+    own, sent = layers.linear(f"{name}.own", x), layers.linear(f"{name}.sent", x)
+    mean = np.empty_like(own)
+    along = layers.array(f"{name}.along")
+    mean_messages(graph.first, graph.neighbour, own, sent, graph.features, along, LEAKY_SLOPE, mean)
+    return layers.linear_of_both(f"{name}.out", x, mean)
 
 
 class StretchInference:
@@ -99,36 +120,18 @@ class StretchInference:
 
     def _features(self, levels: list[HierarchyLevel]) -> list[Floats]:
         """Return the features (V, C) of the nodes of each level: down to the coarsest and up again."""
-        layers, skipped = self._layers, []
+        layers, count, skipped = self._layers, self.options.blocks, []
         x: Floats | None = None
         for k, level in enumerate(levels):
             entered = layers.linear(f"enter.{k}", np.float32(INPUT_SCALE) * level.nodes)
             x = entered if x is None else entered + _max_pooled(x, levels[k - 1].cluster)
-            x = self._blocks(f"down.{k}", x, level.graph)
+            x = blocks(layers, f"down.{k}", count, x, level.graph)
             skipped.append(x)
         features = skipped.copy()
         for k in reversed(range(len(levels) - 1)):
             x = layers.linear_of_both(f"join.{k}", skipped[k], features[k + 1][levels[k].cluster])
-            features[k] = self._blocks(f"up.{k}", x, levels[k].graph)
+            features[k] = blocks(layers, f"up.{k}", count, x, levels[k].graph)
         return features
-
-    def _blocks(self, name: str, x: Floats, graph: Graph) -> Floats:
-        """Return (V, C) after residual blocks: x + linear(leaky(norm(convolution(x))))."""
-        layers = self._layers
-        for k in range(self.options.blocks):
-            block = f"{name}.{k}"
-            inner = leaky(layers.mesh_norm(f"{block}.norm", self._convolution(f"{block}.convolution", x, graph)))
-            x = layers.linear(f"{block}.out", inner) + x
-        return x
-
-    def _convolution(self, name: str, x: Floats, graph: Graph) -> Floats:
-        """Return (V, C): a map of the features and the mean of the messages from the neighbours."""
-        layers = self._layers
-        own, sent = layers.linear(f"{name}.own", x), layers.linear(f"{name}.sent", x)
-        mean = np.empty_like(own)
-        along = layers.array(f"{name}.along")
-        mean_messages(graph.first, graph.neighbour, own, sent, graph.features, along, LEAKY_SLOPE, mean)
-        return layers.linear_of_both(f"{name}.out", x, mean)
 
     def _head(self, name: str, x: Floats, level: HierarchyLevel) -> tuple[Floats, Floats]:
         """Return lines (V, 2) and vectors (V, 3) from the features of the nodes of a level (V, C)."""

@@ -13,14 +13,15 @@ from safetensors.torch import save
 from torch import Tensor, nn
 
 from anisomesh.io.atomic import atomic_path
+from anisomesh.learn.models.normals import NormalFilter
 from anisomesh.learn.models.paper import PaperNetwork
 from anisomesh.learn.models.stretch import StretchNetwork
 from anisomesh.learn.weights_file import OPTIONS_OF_KIND, WeightsError, read_safetensors, read_weights
 
-NETWORKS: dict[str, Any] = {"default": StretchNetwork, "paper": PaperNetwork}
+NETWORKS: dict[str, Any] = {"default": StretchNetwork, "paper": PaperNetwork, "filter": NormalFilter}
 """Class of the network for each kind in a file of weights."""
 
-Network = StretchNetwork | PaperNetwork
+Network = StretchNetwork | PaperNetwork | NormalFilter
 
 
 def save_weights(network: Network, path: Path, facts: dict[str, Any]) -> None:

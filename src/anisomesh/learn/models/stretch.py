@@ -54,11 +54,11 @@ class MeanConvolution(nn.Module):
     squares do. B f_j is computed once per node.
     """
 
-    def __init__(self, inputs: int, channels: int) -> None:
+    def __init__(self, inputs: int, channels: int, edge_features: int = N_EDGE_FEATURES) -> None:
         super().__init__()
         self.sent = nn.Linear(inputs, channels, bias=False)
         self.own = nn.Linear(inputs, channels)
-        self.along = nn.Parameter(torch.randn(N_EDGE_FEATURES, channels) / N_EDGE_FEATURES**0.5)
+        self.along = nn.Parameter(torch.randn(edge_features, channels) / edge_features**0.5)
         self.out = nn.Linear(inputs + channels, channels)
 
     def forward(self, x: Tensor, graph: Graph) -> Tensor:
@@ -70,9 +70,9 @@ class MeanConvolution(nn.Module):
 class ResidualBlock(nn.Module):
     """x + linear(leaky(norm(convolution(x)))); the identity before training."""
 
-    def __init__(self, channels: int) -> None:
+    def __init__(self, channels: int, edge_features: int = N_EDGE_FEATURES) -> None:
         super().__init__()
-        self.convolution = MeanConvolution(channels, channels)
+        self.convolution = MeanConvolution(channels, channels, edge_features)
         self.norm = MeshNorm(channels)
         self.out = nn.Linear(channels, channels)
         nn.init.zeros_(self.out.weight)
@@ -87,8 +87,8 @@ class ResidualBlock(nn.Module):
 class ResidualBlocks(nn.ModuleList):
     """Residual blocks in sequence."""
 
-    def __init__(self, channels: int, count: int) -> None:
-        super().__init__(ResidualBlock(channels) for _ in range(count))
+    def __init__(self, channels: int, count: int, edge_features: int = N_EDGE_FEATURES) -> None:
+        super().__init__(ResidualBlock(channels, edge_features) for _ in range(count))
 
     def forward(self, x: Tensor, graph: Graph) -> Tensor:
         """Return (V, C) from (V, C)."""

@@ -7,11 +7,12 @@ from pathlib import Path
 from typing import Any
 
 from anisomesh.errors import OptionError
-from anisomesh.learn.architecture import NetworkOptions, PaperOptions
-from anisomesh.learn.inference.pretrained import configuration_path, pretrained_configurations, pretrained_networks
+from anisomesh.learn.architecture import FilterOptions, NetworkOptions, PaperOptions
+from anisomesh.learn.inference.pretrained import configuration_path, pretrained_configurations, pretrained_weights
 from anisomesh.learn.training.losses import LAPLACIAN_SCALES, LOSSES
 from anisomesh.toml import check_keys, read_toml
 
+_TABLES: dict[str, Any] = {"network": NetworkOptions, "paper": PaperOptions, "filter": FilterOptions}
 _CHOICES: dict[str, tuple[str, ...]] = {
     "schedule": ("cosine", "halving"),
     "loss": LOSSES,
@@ -52,7 +53,8 @@ class TrainingOptions:
     device
         A torch device, or ``"auto"``: a GPU if there is one, else the CPU.
     network
-        Sizes of the default network or of the paper's; table ``[network]`` or ``[paper]`` of a file.
+        Sizes of the default network, of the paper's, or of the filter of normals; table ``[network]``, ``[paper]`` or
+        ``[filter]`` of a file.
     loss
         For the paper's network: ``"dot"``, ``"l2"`` or ``"cosine"``.
     laplacian, laplacian_scale
@@ -82,7 +84,7 @@ class TrainingOptions:
     keep: str = "best"
     minutes: float = 5.0
     device: str = "auto"
-    network: NetworkOptions | PaperOptions = field(default_factory=NetworkOptions)
+    network: NetworkOptions | PaperOptions | FilterOptions = field(default_factory=NetworkOptions)
     loss: str = "dot"
     laplacian: float = 0.1
     laplacian_scale: str = "paper"
@@ -121,7 +123,7 @@ def load_training(path: str | Path) -> TrainingOptions:
     if str(path) in pretrained_configurations():
         path, folder = configuration_path(str(path)), Path()
     options = parse_training(str(path), read_toml(path))
-    start = options.start if options.start in ("", *pretrained_networks()) else str(folder / options.start)
+    start = options.start if options.start in ("", *pretrained_weights()) else str(folder / options.start)
     return replace(options, data=str(folder / options.data), out=str(folder / options.out), start=start)
 
 
@@ -133,9 +135,11 @@ def parse_training(where: str, table: dict[str, Any]) -> TrainingOptions:
     OptionError
         If a key is unknown, missing, or has a value of the wrong type.
     """
-    if "network" in table and "paper" in table:
-        raise OptionError(f"{where}: give either [network] or [paper], not both")
-    name, options_class = ("paper", PaperOptions) if "paper" in table else ("network", NetworkOptions)
+    given = [name for name in _TABLES if name in table]
+    if len(given) > 1:
+        raise OptionError(f"{where}: give only one of [{'], ['.join(given)}]")
+    name = given[0] if given else "network"
+    options_class = _TABLES[name]
     rest = {key: value for key, value in table.items() if key != name}
     sizes = _checked_values(f"{where}: [{name}]", options_class, table.get(name, {}))
     return TrainingOptions(**_checked_values(where, TrainingOptions, rest), network=options_class(**sizes))

@@ -1,11 +1,14 @@
-"""Losses of embeddings (dot products and Laplacian as in the paper, and others), of line fields and of offsets."""
+"""Losses of embeddings (dot products and Laplacian as in the paper, and others), line fields, offsets and normals."""
 
 from __future__ import annotations
 
 import torch
 from torch import Tensor
 
+from anisomesh.learn.data.examples import OffsetTarget
+
 _LINE_SOFTENING = 0.05  # of the log squared stretch: the loss is quadratic below and linear above it (heuristic)
+_NORMAL_SOFTENING = 0.02  # radians: the loss is quadratic below and linear above it (heuristic)
 _OFFSET_SOFTENING = 0.02  # mean edge lengths: the loss is quadratic below and linear above it (heuristic)
 
 _POINT_COORDINATES = 3  # of the embedding; the network finds the others
@@ -124,32 +127,35 @@ def line_loss(predicted: Tensor, target: Tensor, weight: Tensor) -> Tensor:
     return (weight * distance).sum() / torch.clamp(weight.sum(), min=1e-30)
 
 
-def offset_loss(offsets: Tensor, target: Tensor, quadrics: Tensor, edges: Tensor, weight: Tensor) -> Tensor:
+def offset_loss(offsets: Tensor, target: OffsetTarget) -> Tensor:
     """Return the distance of the moved points from the target surface plus their roughness over it.
 
     Parameters
     ----------
-    offsets, target
-        Offsets of the points and their targets (V, 3), in mean edge lengths.
-    quadrics
-        Mean n n^t over the normals at each point (V, 3, 3); errors in other directions do not count.
-    edges
-        Edges (E, 2), each once.
-    weight
-        Weights of the points (V,), with sum 1.
+    offsets
+        Offsets of the points (V, 3), in mean edge lengths.
+    target
+        The offsets to be found.
 
     Notes
     -----
     The mean over points of the norm of the error in the quadric, plus the mean over edges of the norm of the difference
     of the errors at their ends, which tilts triangles. Both norms are smoothed at zero.
     """
-    error = offsets - target
+    quadrics, edges, weight = target.quadrics, target.edges, target.weight
+    error = offsets - target.offsets
     distance = _smoothed_root(torch.einsum("vi,vij,vj->v", error, quadrics, error))
     a, b = edges[:, 0], edges[:, 1]
     difference = error[a] - error[b]
     roughness = _smoothed_root(torch.einsum("ei,eij,ej->e", difference, 0.5 * (quadrics[a] + quadrics[b]), difference))
     share = weight[a] + weight[b]
     return (weight * distance).sum() + (share * roughness).sum() / share.sum().clamp(min=1e-30)
+
+
+def normal_loss(normals: Tensor, target: Tensor, area: Tensor) -> Tensor:
+    """Return the mean distance between unit normals (F, 3), weighted by shares of the area (F,), smoothed at zero."""
+    square = ((normals - target) ** 2).sum(dim=1)
+    return (area * (torch.sqrt(square + _NORMAL_SOFTENING**2) - _NORMAL_SOFTENING)).sum()
 
 
 def _smoothed_root(square: Tensor) -> Tensor:

@@ -27,9 +27,6 @@ from anisomesh.learn.weights_file import WeightsError
 
 CHECKPOINT, WEIGHTS = "checkpoint.safetensors", "weights.safetensors"
 METRICS, EVENTS = "metrics.jsonl", "events"
-VALIDATION_NOISE = (0.0, 0.3)
-"""Standard deviations of noise in the validation, in mean edge lengths."""
-
 HALVING_PERIODS = 6
 """Parts of a run with a constant learning rate: the paper halves it each 100 of 600 epochs."""
 
@@ -141,7 +138,7 @@ class TrainingRun:
         self.network.eval()
         found = {}
         with torch.no_grad():
-            for noise in VALIDATION_NOISE:
+            for noise in self.task.validation_noise:
                 sums: dict[str, float] = {}
                 baseline = 0.0
                 for number, path in enumerate(self.files.validation):

@@ -1,9 +1,9 @@
-"""Training tasks: examples and losses of the default network (stretch and offsets) and of the paper's (embedding)."""
+"""Training tasks: examples and losses of the default network, of the filter of normals, and of the paper's network."""
 
 from __future__ import annotations
 
 from collections.abc import Iterable, Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any, Protocol
 
 import numpy as np
@@ -11,9 +11,12 @@ import torch
 from torch import Tensor, nn
 
 from anisomesh.denoise.noise import NOISES, with_noise
-from anisomesh.learn.architecture import NetworkOptions, PaperOptions
-from anisomesh.learn.data.examples import StretchExample, stretch_example
+from anisomesh.learn.architecture import FilterOptions, NetworkOptions, PaperOptions
+from anisomesh.learn.data.examples import FilterExample, StretchExample, filter_example, stretch_example
 from anisomesh.learn.data.items import Item
+from anisomesh.learn.graphs.faces import FILTER_ROUNDS
+from anisomesh.learn.inference.predict import NOISE_FLOOR, moved_by_network
+from anisomesh.learn.models.normals import NormalFilter
 from anisomesh.learn.models.paper import PaperInput, PaperNetwork, joined, paper_input
 from anisomesh.learn.models.stretch import Prediction, StretchNetwork
 from anisomesh.learn.training.config import TrainingOptions
@@ -24,6 +27,7 @@ from anisomesh.learn.training.losses import (
     laplacian_loss,
     laplacian_unit,
     line_loss,
+    normal_loss,
     offset_loss,
 )
 from anisomesh.mesh.surface import Surface
@@ -31,7 +35,11 @@ from anisomesh.mesh.surface import Surface
 N_SYMMETRIES = 10
 """Number of symmetries of the paper's augmentation."""
 
+VALIDATION_NOISE = (0.0, 0.3)
+"""Standard deviations of noise in the validation of the networks for metrics, in mean edge lengths."""
+
 _OFFSET_WEIGHT = 2.0  # heuristic: weight of the loss of offsets; the loss of line fields has weight 1
+_MOVE_WEIGHT, _FILTERED_WEIGHT, _ROUND_WEIGHT = 1.0, 0.5, 0.25  # heuristic: offsets; normals, last and all
 _QUARTER_TURN = np.array([[0.0, -1.0, 0.0], [1.0, 0.0, 0.0], [0.0, 0.0, 1.0]])  # about the z axis
 
 Losses = dict[str, Tensor]
@@ -45,9 +53,12 @@ class Task(Protocol):
     ----------
     copies
         Number of examples of each item in an epoch.
+    validation_noise
+        Standard deviations of noise in the validation, in mean edge lengths.
     """
 
     copies: int
+    validation_noise: tuple[float, ...]
 
     def network(self) -> nn.Module:
         """Return a network with random weights."""
@@ -66,12 +77,14 @@ class Task(Protocol):
         ...
 
     def baseline_losses(self, example: Any) -> Losses:
-        """Return the losses of the constant prediction of no stretch and no noise."""
+        """Return the losses that those of the network are compared with: of no stretch and no noise, or a filter's."""
         ...
 
 
 def task_of(options: TrainingOptions) -> Task:
     """Return the task of a training run."""
+    if isinstance(options.network, FilterOptions):
+        return FilterTask(options)
     return StretchTask(options) if isinstance(options.network, NetworkOptions) else EmbeddingTask(options)
 
 
@@ -79,6 +92,7 @@ class StretchTask:
     """Line field and offsets of the default network, which needs no augmentation by rotations as it is equivariant."""
 
     copies = 1
+    validation_noise: tuple[float, ...] = VALIDATION_NOISE
 
     def __init__(self, options: TrainingOptions) -> None:
         assert isinstance(options.network, NetworkOptions)
@@ -105,15 +119,13 @@ class StretchTask:
 
     def baseline_losses(self, example: StretchExample) -> Losses:
         """See :class:`Task`."""
-        nothing = Prediction(torch.zeros_like(example.line_field), torch.zeros_like(example.offsets))
+        nothing = Prediction(torch.zeros_like(example.line_field), torch.zeros_like(example.offsets.offsets))
         return self._losses(nothing, example)
 
     def _losses(self, found: Prediction, example: StretchExample) -> Losses:
-        offset = offset_loss(
-            found.offsets / example.unit, example.offsets, example.quadrics, example.edges, example.weight
-        )
+        offset = offset_loss(found.offsets / example.offsets.unit, example.offsets)
         return {
-            "lines": line_loss(found.line_field, example.line_field, example.weight),
+            "lines": line_loss(found.line_field, example.line_field, example.offsets.weight),
             "offsets": _OFFSET_WEIGHT * offset,
         }
 
@@ -129,8 +141,63 @@ class EmbeddingExample:
     edges: Tensor
 
 
+class FilterTask:
+    """The filter of normals, behind the pretrained default network; it is compared with the bilateral filter."""
+
+    copies = 1
+    validation_noise: tuple[float, ...] = (0.1, 0.3, 0.5)
+
+    def __init__(self, options: TrainingOptions) -> None:
+        assert isinstance(options.network, FilterOptions)
+        self._network = options.network
+        self._bilateral = NormalFilter(replace(options.network, rounds=FILTER_ROUNDS))
+
+    def network(self) -> NormalFilter:
+        """See :class:`Task`."""
+        return NormalFilter(self._network)
+
+    def example(
+        self, item: Item, noise: float, rng: np.random.Generator, *, training: bool, copy: int = 0
+    ) -> FilterExample:
+        """See :class:`Task`. Training has noise of all kinds, validation independent noise."""
+        kind = NOISES[int(rng.integers(len(NOISES)))] if training else NOISES[0]
+        return filter_example(item, moved_by_network, max(noise, NOISE_FLOOR), rng, kind)
+
+    def losses(self, network: nn.Module, example: FilterExample) -> Losses:
+        """See :class:`Task`."""
+        found = network(example.faces)
+        points = found.points.cpu()
+        normals = [*(each.cpu() for each in found.rounds), _normals_of(points, example.corners)]
+        losses = [normal_loss(each, example.normals, example.area) for each in normals]
+        offsets = (points - example.points) / example.offsets.unit
+        return {
+            "rounds": _ROUND_WEIGHT * torch.stack(losses[:-1]).mean(),
+            "filtered": _FILTERED_WEIGHT * losses[-2],
+            "normals": losses[-1],
+            "offsets": _MOVE_WEIGHT * offset_loss(offsets, example.offsets),
+        }
+
+    def training_losses(self, network: nn.Module, examples: Iterable[FilterExample]) -> Iterator[Losses]:
+        """See :class:`Task`."""
+        return (self.losses(network, example) for example in examples)
+
+    def baseline_losses(self, example: FilterExample) -> Losses:
+        """See :class:`Task`. Before its training a filter is bilateral."""
+        with torch.no_grad():
+            return self.losses(self._bilateral, example)
+
+
+def _normals_of(points: Tensor, faces: Tensor) -> Tensor:
+    """Return the unit normals (F, 3) of faces (F, 3) of points (V, 3)."""
+    corners = points[faces]
+    normals = torch.linalg.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
+    return nn.functional.normalize(normals, dim=1, eps=1e-30)
+
+
 class EmbeddingTask:
     """Extra coordinates of the paper's network, with its losses and its augmentation by rotations and mirrors."""
+
+    validation_noise: tuple[float, ...] = VALIDATION_NOISE
 
     def __init__(self, options: TrainingOptions) -> None:
         assert isinstance(options.network, PaperOptions)
