@@ -87,7 +87,7 @@ def test_textures_and_display_colours_of_3mf_are_in_glb(tmp_path, log):
         surface=BOX,
         corner_data={"uv": UV},
         regions={"texture": Regions(LABELS, {1: "wood.png", 2: "stone.png"}), "material": oak},
-        materials={"textures": textures, "display_colours": {5: "#BC8040"}},
+        materials={"textures": textures, "display_colours": {5: "#BC8040"}, "unit": "meter"},
     )
     save(given, tmp_path / "a.3mf")
     save(load_mesh(tmp_path / "a.3mf"), tmp_path / "a.glb")

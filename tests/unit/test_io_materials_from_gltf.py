@@ -43,7 +43,7 @@ GLTF = {
 
 def mesh_with(gltf=GLTF, labels=LABELS, names=NAMES):
     regions = {"material": Regions(labels, names)}
-    return Mesh(surface=BOX, corner_data={"uv": UV}, regions=regions, materials={"gltf": gltf})
+    return Mesh(surface=BOX, corner_data={"uv": UV}, regions=regions, materials={"gltf": gltf, "unit": "meter"})
 
 
 @pytest.fixture(autouse=True)

@@ -16,6 +16,7 @@ from anisomesh.io.formats.gltf.read import MATERIAL, NODE
 from anisomesh.io.formats.gltf.write import glb_bytes
 from anisomesh.io.formats.gmsh.elements import PHYSICAL
 from anisomesh.io.formats.region_names import region_texts
+from anisomesh.io.formats.units import UNIT, in_unit_of
 from anisomesh.io.formats.vtk.data import ORIGINAL_POINT
 from anisomesh.io.formats.vtk.write import active_names, vtk_polygons
 from anisomesh.io.holding import (
@@ -53,7 +54,7 @@ def to_pyvista(mesh: Mesh) -> Any:
     """
     pyvista, numpy_support = import_module("pyvista"), import_module("vtkmodules.util.numpy_support")
     losses = Losses()
-    mesh, (cells, (point_data, cell_data, fields)) = vtk_polygons(mesh, losses)
+    mesh, (cells, (point_data, cell_data, fields)) = vtk_polygons(in_unit_of(mesh, "", losses), losses)
     data = pyvista.PolyData.from_regular_faces(mesh.surface.points, mesh.surface.faces)
     for name, section in (("verts", "Verts"), ("lines", "Lines")):
         rows = cells[section]
@@ -102,7 +103,7 @@ def to_meshio(mesh: Mesh) -> Any:
         theirs.get(name, name): [kind.labels(name) for kind in kinds] for name in names if not name.startswith(CELL_SET)
     }
     losses.add("face data", *(name for name in mesh.face_data if name in labels))
-    losses.add("materials", *mesh.materials)
+    losses.add("materials", *in_unit_of(mesh, "", losses).materials)
     losses.fixed_faces(mesh)
     blank = {
         name: [values, *(_blank(values, len(kind.nodes)) for kind in kinds[1:])]
@@ -183,7 +184,7 @@ def to_trimesh(mesh: Mesh) -> Any:
     nodes, materials, table = mesh.regions.get(NODE), mesh.regions.get(MATERIAL), _trimesh_materials(mesh)
     others = [name for name in mesh.regions if name not in (NODE, MATERIAL)]
     losses.names_of_regions(mesh, *others)
-    held = ["unit", *(name for name in (TRIMESH, "gltf") if isinstance(mesh.materials.get(name), Mapping))]
+    held = [UNIT, *(name for name in (TRIMESH, "gltf") if isinstance(mesh.materials.get(name), Mapping))]
     losses.add("materials", *(name for name in mesh.materials if name not in held))
     none = np.zeros(mesh.surface.n_faces, dtype=np.int64)
     texts = {} if nodes is None else region_texts(nodes, losses, distinct=True)
@@ -196,8 +197,8 @@ def to_trimesh(mesh: Mesh) -> Any:
     _warn("trimesh", losses)
     is_scene = len(scene.geometry) > 1 or nodes is not None
     found = scene if is_scene else next(iter(scene.geometry.values()))
-    if isinstance(mesh.materials.get("unit"), str):
-        found.units = mesh.materials["unit"]
+    if isinstance(mesh.materials.get(UNIT), str):
+        found.units = mesh.materials[UNIT]
     return found
 
 

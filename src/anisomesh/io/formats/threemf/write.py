@@ -16,6 +16,7 @@ from anisomesh.io.formats.threemf.properties import MATERIAL, OBJECT, TEXTURE, T
 from anisomesh.io.formats.threemf.read import MODEL_TYPE, ROOT
 from anisomesh.io.formats.threemf.resources import CORE, MATERIALS
 from anisomesh.io.formats.threemf.textures import Images, Textured, in_xml, textured
+from anisomesh.io.formats.units import OF_3MF, UNIT
 from anisomesh.io.formats.words import format_rows
 from anisomesh.io.holding import Losses, by_label, main_division, share_not_finite
 
@@ -29,7 +30,7 @@ _UNITS = ("micron", "millimeter", "centimeter", "inch", "foot", "meter")
 
 
 def threemf_bytes(mesh: Mesh, losses: Losses) -> bytes:
-    """Return the content of a 3MF archive, in millimetres unless the input had another unit.
+    """Return the content of a 3MF archive, in millimetres unless the mesh has another unit.
 
     Notes
     -----
@@ -47,12 +48,12 @@ def threemf_bytes(mesh: Mesh, losses: Losses) -> bytes:
     first = _FIRST_FREE if textures is None else textures.next_number
     objects = _objects(mesh, None if found is None else found[1], properties, first, losses)
     items = "".join(f'<item objectid="{first + k}"/>' for k in range(len(objects)))
-    unit = mesh.materials.get("unit", "millimeter")
-    known = ("unit", "display_colours") if textures is None else ("unit", "display_colours", TEXTURES)
+    unit = mesh.materials.get(UNIT, OF_3MF)
+    known = (UNIT, "display_colours") if textures is None else (UNIT, "display_colours", TEXTURES)
     losses.add("materials", *(name for name in mesh.materials if name not in known))
     if unit not in _UNITS:
-        losses.say(f"the unit {unit!r}, for which the file has millimeter")
-        unit = "millimeter"
+        losses.say(f"the unit {unit!r}, for which the file has {OF_3MF}")
+        unit = OF_3MF
     model = (
         f'{_HEAD}<model unit="{unit}" xmlns="{CORE}" xmlns:m="{MATERIALS}">\n<resources>{resources}{"".join(objects)}'
         f"</resources><build>{items}</build></model>\n"
