@@ -127,3 +127,17 @@ def test_a_broken_colour_or_texture_is_no_error(tmp_path, log):
     save(Mesh(surface=BOX, corner_data={"uv": UV}, regions=regions, materials=materials), tmp_path / "a.glb")
     assert "left out" in log.text
     assert load_mesh(tmp_path / "a.glb").surface.n_faces == BOX.n_faces
+
+
+@pytest.mark.parametrize("suffix", [".glb", ".3mf"])
+def test_options_of_textures_are_named(tmp_path, log, suffix):
+    """Regression: a texture was written without its scale and offset, and nothing was said."""
+    (tmp_path / "in").mkdir()
+    (tmp_path / "in" / "oak.png").write_bytes(image(PIXELS))
+    plain = "newmtl wood\nmap_Kd -s 1 1 1.0 -o 0 -clamp OFF -blendu on oak.png\nnewmtl red\nKd 1 0 0\n"
+    mesh = obj(tmp_path / "in", plain)
+    save(mesh, tmp_path / f"a{suffix}")
+    assert "option" not in log.text
+    mesh = obj(tmp_path / "in", plain.replace("-s 1 1 1.0", "-s 2 2 -texres 64").replace("OFF", "on"))
+    save(mesh, tmp_path / f"a{suffix}")
+    assert "the options -clamp, -s, -texres of map_Kd of materials" in log.text

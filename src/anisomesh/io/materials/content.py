@@ -14,6 +14,7 @@ from anisomesh.io.known_formats import WRITERS
 from anisomesh.io.materials import files as material_files
 from anisomesh.io.materials import from_gltf
 from anisomesh.io.materials.for_gltf import with_gltf_materials
+from anisomesh.io.materials.textures import relative_name
 
 logger = logging.getLogger(__name__)
 
@@ -40,7 +41,7 @@ def file_content(mesh: Mesh, name: str, suffix: str, losses: Losses, *, in_file:
         If the format cannot hold the mesh.
     """
     folder = material_files.folder_of(name) if in_file else Path.cwd()
-    mesh = in_unit_of(_named_from(mesh, folder), suffix, losses)
+    mesh = in_unit_of(_named_from(mesh, folder, suffix, losses), suffix, losses)
     looks: dict[int, from_gltf.Look] = {}
     if suffix == ".glb":
         mesh = with_gltf_materials([mesh], losses)[0]
@@ -61,13 +62,17 @@ def levels_for_glb(meshes: Sequence[Mesh], path: Path, losses: Losses) -> list[M
     """Return levels of detail, the finest first, as GLB holds them; what it cannot hold is said of the finest."""
     folder = material_files.folder_of(path)
     each = [losses, *(Losses() for _ in meshes[1:])]
-    own = [in_unit_of(_named_from(mesh, folder), ".glb", kept) for mesh, kept in zip(meshes, each, strict=True)]
+    own = [
+        in_unit_of(_named_from(mesh, folder, ".glb", kept), ".glb", kept)
+        for mesh, kept in zip(meshes, each, strict=True)
+    ]
     return with_gltf_materials(own, losses)
 
 
-def _named_from(mesh: Mesh, folder: Path) -> Mesh:
-    """Return a mesh whose textures have the names of their files from a folder."""
-    return material_files.with_texture_names(mesh, lambda name: material_files.relative_name(name, folder))
+def _named_from(mesh: Mesh, folder: Path, suffix: str, losses: Losses) -> Mesh:
+    """Return a mesh whose textures have the names of their files from a folder; missing files are losses."""
+    material_files.say_missing_textures(mesh, suffix, losses)
+    return material_files.with_texture_names(mesh, lambda name: relative_name(name, folder))
 
 
 def warn_of_losses(name: str, suffix: str, losses: Losses) -> None:

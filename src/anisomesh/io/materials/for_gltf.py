@@ -15,7 +15,7 @@ from anisomesh.io.formats.region_names import in_words, region_texts
 from anisomesh.io.formats.threemf.properties import TEXTURE, TEXTURES
 from anisomesh.io.formats.threemf.textures import image_kind
 from anisomesh.io.holding import Losses
-from anisomesh.io.materials.files import referred_file
+from anisomesh.io.materials.textures import texture_line
 
 DISPLAYED = "display_colours"
 """Key of the display colours of 3MF by the labels of base materials."""
@@ -107,20 +107,24 @@ def _looks_of_obj(mesh: Mesh, losses: Losses) -> _Looks:
             lines = told.setdefault(in_words(rest), {})
         elif word and not word.startswith("#"):
             lines[word] = line
-    looks, others = {}, set[str]()
+    looks, others, options = {}, set[str](), set[str]()
     for label in _labels(regions):
         given = {word.lower(): line for word, line in told.get(regions.names.get(label, ""), {}).items()}
         colour = _numbers(given.pop("kd", ""))
         opacity = [*_numbers(given.pop("d", "")), *(1.0 - t for t in _numbers(given.pop("tr", ""))), 1.0][0]
         image = b""
         if "map_kd" in given:
-            file = referred_file(given.pop("map_kd"), folder)
-            image = _held_image(None if file is None else file.read_bytes(), regions, label, losses)
+            texture = texture_line(given.pop("map_kd"), folder)
+            data = None if texture is None or texture.file is None else texture.file.read_bytes()
+            image = _held_image(data, regions, label, losses)
+            options.update(() if texture is None else texture.options)
         of_colour = (1.0, 1.0, 1.0) if image else colour if len(colour) == 3 else ()
         looks[MATERIAL, label] = _Look((*of_colour, opacity) if of_colour else (), image)
         others |= given.keys()
     if others:
         losses.say(f"the statements {', '.join(sorted(others))} of materials")
+    if options:
+        losses.say(f"the options {', '.join(sorted(options))} of map_Kd of materials")
     return looks
 
 
