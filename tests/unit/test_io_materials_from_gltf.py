@@ -202,3 +202,51 @@ def test_a_broken_colour_of_gltf_is_white(tmp_path, suffix, colour):
         assert (tmp_path / "a.mtl").read_text().count("Kd 1.0 1.0 1.0\n") == 3
     else:
         assert set(read.materials["display_colours"].values()) == {"#FFFFFFFF"}
+
+
+NAMED = {"materials": [{"name": "wood"}, {"name": "red glass"}, {"name": "grey"}, {"name": "unused"}]}
+
+
+@pytest.mark.parametrize("suffix", [".obj", ".ply", ".vtu", ".3mf"])
+def test_nothing_is_lost_of_materials_that_have_names_only(tmp_path, log, suffix):
+    """Regression: materials 'gltf' were said to be left out."""
+    given = mesh_with(NAMED, names={0: "wood", 2: "grey"})
+    save(given, tmp_path / f"a{suffix}")
+    assert "gltf" not in log.text
+    assert "names of regions with nothing in them, 'unused'" in log.text
+    assert set(load_mesh(tmp_path / f"a{suffix}").regions["material"].names.values()) >= set(NAMES.values())
+
+
+@pytest.mark.parametrize("suffix", [".obj", ".3mf"])
+@pytest.mark.parametrize("colour", [{}, physical(baseColorFactor=[1, 0, 0, 1])])
+def test_other_properties_of_gltf_are_named(tmp_path, log, suffix, colour):
+    """Regression: sides and extras of materials were lost without a line."""
+    usual = {**colour, "doubleSided": False, "extras": {}, "alphaMode": "OPAQUE"}
+    save(mesh_with({"materials": [usual]}), tmp_path / f"a{suffix}")
+    assert "the properties" not in log.text
+    others = {**colour, "doubleSided": True, "extras": {"kind": "oak"}, "alphaMode": "MASK"}
+    save(mesh_with({"materials": [others]}), tmp_path / f"a{suffix}")
+    assert "the properties alphaMode, doubleSided, extras of materials" in log.text
+
+
+@pytest.mark.parametrize(
+    ("extension", "said"), [("KHR_texture_transform", "a texture transform"), ("EXT_other", "EXT_other")]
+)
+def test_extensions_of_textures_are_named(tmp_path, log, extension, said):
+    """Regression: a transform was called texture coordinates of its own."""
+    texture = physical(baseColorTexture={"index": 0, "extensions": {extension: {"offset": [1, 0]}}})
+    save(mesh_with({**GLTF, "materials": [texture]}, names={0: "a"}), tmp_path / "a.obj")
+    assert f"the texture of 'a': it has {said}" in log.text
+    assert "map_Kd" not in (tmp_path / "a.mtl").read_text()
+
+
+def test_equal_names_of_materials_are_said_to_be_changed(tmp_path, log):
+    """Regression: some characters of a name were said to be left out, or nothing."""
+    save(mesh_with(names={0: "wood", 1: "grey", 2: "grey"}), tmp_path / "a.obj")
+    assert "equal names of 1 region(s) such as 'grey', which is 'grey_2' there" in log.text
+    assert "usemtl grey_2\n" in (tmp_path / "a.obj").read_text()
+    log.clear()
+    regions = {"group": Regions(LABELS, {1: "a", 2: "a"})}
+    save(Mesh(surface=BOX, regions=regions), tmp_path / "b.obj")
+    assert "equal names of 1 region(s) such as 'a', which is 'a_2' there" in log.text
+    assert "characters" not in log.text

@@ -49,6 +49,8 @@ def file_content(mesh: Mesh, name: str, suffix: str, losses: Losses, *, in_file:
         mesh = from_gltf.with_3mf_materials(mesh, losses)
     elif suffix == ".obj" and in_file:
         mesh, looks = from_gltf.with_obj_materials(mesh, losses)
+    else:
+        mesh = from_gltf.without_mere_names(mesh, losses)
     try:
         content = WRITERS[suffix](mesh, losses)
     except ValueError as error:

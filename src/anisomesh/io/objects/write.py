@@ -27,6 +27,7 @@ from anisomesh.io.holding import (
     continuous_corner_data,
     with_points_repeated,
 )
+from anisomesh.io.materials.from_gltf import without_mere_names
 from anisomesh.io.objects.read import CELL_SET, MESHIO_DIVISIONS
 from anisomesh.io.objects.trimesh_scenes import TRIMESH
 from anisomesh.mesh.surface import Surface
@@ -54,7 +55,7 @@ def to_pyvista(mesh: Mesh) -> Any:
     """
     pyvista, numpy_support = import_module("pyvista"), import_module("vtkmodules.util.numpy_support")
     losses = Losses()
-    mesh, (cells, (point_data, cell_data, fields)) = vtk_polygons(in_unit_of(mesh, "", losses), losses)
+    mesh, (cells, (point_data, cell_data, fields)) = vtk_polygons(_plain(mesh, losses), losses)
     data = pyvista.PolyData.from_regular_faces(mesh.surface.points, mesh.surface.faces)
     for name, section in (("verts", "Verts"), ("lines", "Lines")):
         rows = cells[section]
@@ -103,7 +104,7 @@ def to_meshio(mesh: Mesh) -> Any:
         theirs.get(name, name): [kind.labels(name) for kind in kinds] for name in names if not name.startswith(CELL_SET)
     }
     losses.add("face data", *(name for name in mesh.face_data if name in labels))
-    losses.add("materials", *in_unit_of(mesh, "", losses).materials)
+    losses.add("materials", *_plain(mesh, losses).materials)
     losses.fixed_faces(mesh)
     blank = {
         name: [values, *(_blank(values, len(kind.nodes)) for kind in kinds[1:])]
@@ -119,6 +120,11 @@ def to_meshio(mesh: Mesh) -> Any:
     )
     _warn("meshio", losses)
     return result
+
+
+def _plain(mesh: Mesh, losses: Losses) -> Mesh:
+    """Return a mesh for libraries without units and materials, without what is not said to be left out."""
+    return in_unit_of(without_mere_names(mesh, losses), "", losses)
 
 
 class _Cells(NamedTuple):

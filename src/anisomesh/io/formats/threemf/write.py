@@ -108,6 +108,8 @@ def _materials(mesh: Mesh, materials: Regions, losses: Losses) -> tuple[str, Arr
     texts = region_texts(materials, losses, in_xml, distinct=True)
     labels = [label for label in texts if label != 0 or label in materials.names or len(texts) == 1]
     entries = []
+    if (n_unknown := sum(not displayed.get(label) for label in labels)) > 0:
+        losses.say(f"unknown colours of {n_unknown} of {len(labels)} material(s): they are grey")
     for label in labels:
         name = quoteattr(texts[label])
         entries.append(f'<base name={name} displaycolor="{displayed.get(label) or _GREY}"/>')
