@@ -176,7 +176,7 @@ def cut_input(given: Mesh, options: RemeshOptions, run: Run, *, joined: bool = T
 def with_attributes(result: RemeshResult, given: Mesh, cut: Cut, options: RemeshOptions, run: Run) -> RemeshResult:
     """Return a result with everything that a mesh carries."""
     if given.is_bare:
-        return result
+        return replace(result, mesh=replace(result.mesh, materials=given.materials)) if given.materials else result
 
     def oriented(mesh: Mesh) -> Mesh:
         return oriented_as(mesh, result.prepared) if result.prepare_report.faces_flipped else mesh

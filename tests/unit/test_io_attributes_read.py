@@ -389,8 +389,8 @@ def test_glb(tmp_path, caplog):
     assert mesh.regions["node"].names == {0: "a mesh", 1: "second"}
     assert mesh.regions["material"].labels.tolist() == [1, -1]
     assert mesh.regions["material"].names == {0: "unused"} or mesh.regions["material"].names == {}
-    np.testing.assert_array_equal(mesh.point_data["uv"], [[0, 0], [0, 1], [1, 1], [0, 0], [0, 0], [0, 0]])
-    np.testing.assert_array_equal(mesh.point_data["uv1"], [[0, 0], [0, 0], [0, 0], [0, 0], [0, 1], [1, 1]])
+    np.testing.assert_array_equal(mesh.point_data["uv"], [[0, 0], [0, 1], [1, 1], *[[np.nan] * 2] * 3])
+    np.testing.assert_array_equal(mesh.point_data["uv1"], [*[[np.nan] * 2] * 3, [0, 0], [0, 1], [1, 1]])
     assert mesh.point_data["color"].dtype == np.uint8
     np.testing.assert_array_equal(mesh.point_data["color"].ravel(), [*range(12), *[255] * 12])
     np.testing.assert_array_equal(mesh.point_data["HEAT"], [1, 2, 3, *[np.nan] * 3])

@@ -85,7 +85,7 @@ def test_textures_and_display_colours_of_3mf_are_in_glb(tmp_path, log):
     oak = Regions(np.where(LABELS == 0, 5, 0), {5: "oak"})
     given = Mesh(
         surface=BOX,
-        corner_data={"uv": UV},
+        corner_data={"uv": np.where((LABELS > 0)[:, None, None], UV, np.nan)},
         regions={"texture": Regions(LABELS, {1: "wood.png", 2: "stone.png"}), "material": oak},
         materials={"textures": textures, "display_colours": {5: "#BC8040"}, "unit": "meter"},
     )
@@ -137,7 +137,7 @@ def test_options_of_textures_are_named(tmp_path, log, suffix):
     plain = "newmtl wood\nmap_Kd -s 1 1 1.0 -o 0 -clamp OFF -blendu on oak.png\nnewmtl red\nKd 1 0 0\n"
     mesh = obj(tmp_path / "in", plain)
     save(mesh, tmp_path / f"a{suffix}")
-    assert "option" not in log.text
+    assert "the options" not in log.text
     mesh = obj(tmp_path / "in", plain.replace("-s 1 1 1.0", "-s 2 2 -texres 64").replace("OFF", "on"))
     save(mesh, tmp_path / f"a{suffix}")
     assert "the options -clamp, -s, -texres of map_Kd of materials" in log.text

@@ -14,6 +14,9 @@ from anisomesh._arrays import EdgeEnds
 from anisomesh.errors import MeshError
 from anisomesh.mesh.surface import Surface
 
+UNIT = "unit"
+"""Key of the unit of length among the materials of a mesh."""
+
 _KINDS = "biufcSU"  # of dtypes: bools, integers, real and complex numbers, strings
 
 Array = npt.NDArray[Any]
@@ -145,8 +148,9 @@ class Mesh:
 
     @property
     def is_bare(self) -> bool:
-        """Whether the mesh carries nothing besides its surface."""
-        return not any(len(getattr(self, f.name)) for f in fields(self) if f.name != "surface")
+        """Whether the mesh carries nothing besides its surface and a unit of length."""
+        carried = (f.name for f in fields(self) if f.name not in ("surface", "materials"))
+        return not self.materials.keys() - {UNIT} and not any(len(getattr(self, name)) for name in carried)
 
     @cached_property
     def parts(self) -> Ints:

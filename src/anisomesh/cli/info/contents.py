@@ -6,8 +6,8 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from anisomesh.attributes.model import UNIT
 from anisomesh.cli.report import counted
-from anisomesh.io.formats.units import UNIT
 
 if TYPE_CHECKING:
     from collections.abc import Mapping

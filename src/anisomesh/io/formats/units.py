@@ -4,11 +4,8 @@ from __future__ import annotations
 
 from dataclasses import replace
 
-from anisomesh.attributes.model import Mesh
+from anisomesh.attributes.model import UNIT, Mesh
 from anisomesh.io.holding import Losses
-
-UNIT = "unit"
-"""Key of the unit of length among the materials of a mesh."""
 
 OF_3MF, OF_GLB = "millimeter", "meter"
 """The unit of 3MF files that name none, and of all GLB files, by specification."""

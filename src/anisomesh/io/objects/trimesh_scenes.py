@@ -9,6 +9,7 @@ from typing import Any
 
 import numpy as np
 
+from anisomesh.attributes.model import UNIT
 from anisomesh.io.carried import COLOUR, UV, Array, Carried
 from anisomesh.io.cells import SurfaceCells
 from anisomesh.io.formats.gltf.attributes import Attributes
@@ -16,7 +17,6 @@ from anisomesh.io.formats.gltf.document import Document
 from anisomesh.io.formats.gltf.materials import read_materials
 from anisomesh.io.formats.gltf.read import MATERIAL, NODE
 from anisomesh.io.formats.region_names import divide
-from anisomesh.io.formats.units import UNIT
 from anisomesh.io.polygons import PolygonSoup
 
 TRIMESH = "trimesh"

@@ -10,13 +10,13 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from anisomesh.attributes.model import Mesh, Regions
+from anisomesh.attributes.model import UNIT, Mesh, Regions
 from anisomesh.io.carried import COLOUR, UV, Array, Integers
 from anisomesh.io.formats.gltf.read import MATERIAL, NODE
 from anisomesh.io.formats.gltf.write import glb_bytes
 from anisomesh.io.formats.gmsh.elements import PHYSICAL
 from anisomesh.io.formats.region_names import region_texts
-from anisomesh.io.formats.units import UNIT, in_unit_of
+from anisomesh.io.formats.units import in_unit_of
 from anisomesh.io.formats.vtk.data import ORIGINAL_POINT
 from anisomesh.io.formats.vtk.write import active_names, vtk_polygons
 from anisomesh.io.holding import (
@@ -236,6 +236,9 @@ def _trimesh_part(mesh: Mesh, chosen: Integers, material: Any) -> Any:
     of_faces = {name: values[chosen] for name, values in mesh.face_data.items()}
     visual, count = None, len(chosen)
     uv = of_points.get(UV)
+    if uv is not None and uv.dtype.kind == "f" and np.isnan(uv).all():
+        del of_points[UV]  # of faces without a texture
+        uv = None
     if material is not None or uv is not None:
         visual = trimesh.visual.TextureVisuals(uv=of_points.pop(UV, None), material=material)
     elif COLOUR in of_points:

@@ -15,12 +15,13 @@ from xml.parsers import expat
 import numpy as np
 import numpy.typing as npt
 
+from anisomesh.attributes.model import UNIT
 from anisomesh.io.carried import Carried, listed
 from anisomesh.io.cells import SurfaceCells
 from anisomesh.io.formats.region_names import also_named
 from anisomesh.io.formats.threemf.properties import MATERIAL, OBJECT, TEXTURES, Properties
 from anisomesh.io.formats.threemf.resources import CORE, NONE, Resources, number
-from anisomesh.io.formats.units import OF_3MF, UNIT
+from anisomesh.io.formats.units import OF_3MF
 from anisomesh.io.polygons import Integers, PolygonSoup
 
 ROOT = "3D/3dmodel.model"

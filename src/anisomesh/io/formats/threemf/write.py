@@ -9,14 +9,14 @@ from xml.sax.saxutils import quoteattr
 
 import numpy as np
 
-from anisomesh.attributes.model import Mesh, Regions
+from anisomesh.attributes.model import UNIT, Mesh, Regions
 from anisomesh.io.carried import COLOUR, UV, Array, Integers
 from anisomesh.io.formats.region_names import region_texts
 from anisomesh.io.formats.threemf.properties import MATERIAL, OBJECT, TEXTURE, TEXTURES
 from anisomesh.io.formats.threemf.read import MODEL_TYPE, ROOT
 from anisomesh.io.formats.threemf.resources import CORE, MATERIALS
 from anisomesh.io.formats.threemf.textures import Images, Textured, in_xml, textured
-from anisomesh.io.formats.units import OF_3MF, UNIT
+from anisomesh.io.formats.units import OF_3MF
 from anisomesh.io.formats.words import format_rows
 from anisomesh.io.holding import Losses, by_label, main_division, share_not_finite
 
@@ -71,10 +71,10 @@ def _properties(mesh: Mesh, textures: Textured | None, losses: Losses) -> tuple[
     held = [*([] if rgba is None else [COLOUR]), *([] if textures is None else [UV])]
     for what, where, data in (("point data", "points", mesh.point_data), ("corner data", "corners", mesh.corner_data)):
         losses.add(what, *(name for name in data if name not in held))
-        for name in (name for name in (COLOUR, UV) if name in data and name not in held):
-            rows = data[name].reshape(-1, data[name].shape[-1])
+        if COLOUR in data and COLOUR not in held:
+            rows = data[COLOUR].reshape(-1, data[COLOUR].shape[-1])
             if rows.dtype.kind == "f" and (reason := share_not_finite(rows, where)):
-                losses.because(what, name, reason)
+                losses.because(what, COLOUR, reason)
     if materials is not None:
         group, attributes = _materials(mesh, materials, losses)
     elif rgba is not None:
