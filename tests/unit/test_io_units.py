@@ -8,7 +8,8 @@ import numpy as np
 import pytest
 import trimesh
 
-from anisomesh.attributes.model import Mesh
+import anisomesh
+from anisomesh.attributes.model import Mesh, Regions
 from anisomesh.io.convert import from_object
 from anisomesh.io.known_formats import MESH_FORMATS
 from anisomesh.io.meshes import load_mesh, save
@@ -75,3 +76,16 @@ def test_units_of_trimesh(log, units, unit):
     assert mesh.materials.get("unit") == unit
     save(mesh, io.BytesIO(), file_format="glb")
     assert ("GLB means meter" in log.text) == (unit == "millimeter")
+
+
+@pytest.mark.parametrize("attributes", [True, False])
+def test_a_remesh_keeps_the_unit(tmp_path, attributes):
+    """Also where nothing else is carried: a result in other numbers would have another size."""
+    regions = {"node": Regions(np.arange(BOX.n_faces) % 2)}
+    save(Mesh(surface=BOX, regions=regions if not attributes else {}), tmp_path / "a.glb")
+    options = {"n_vertices": 8, "max_iterations": 1, "fit": False, "attributes": attributes}
+    result = anisomesh.remesh(tmp_path / "a.glb", **options)
+    assert result.mesh.is_bare
+    assert result.mesh.materials == {"unit": "meter"}
+    save(result.mesh, tmp_path / "b.3mf")
+    assert '<model unit="meter"' in model(tmp_path / "b.3mf")
