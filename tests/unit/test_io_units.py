@@ -49,7 +49,7 @@ def test_glb_of_a_mesh_in_another_unit_says_that_glb_means_metres(tmp_path, log,
     """Regression: nothing was said of millimetres, and of others only that the unit was left out."""
     save(Mesh(surface=BOX, materials={"unit": unit}), tmp_path / "a.3mf")
     write(load_mesh(tmp_path / "a.3mf"), tmp_path / "b.glb")
-    assert log.text.count(f"the unit {unit}: coordinates stay as they are, and GLB means meter") == 1
+    assert log.text.count(f"the unit {unit}: coordinates stay as they are, and GLB means metre") == 1
     assert len(log.records) == 1
     np.testing.assert_array_equal(load_mesh(tmp_path / "b.glb").surface.points, BOX.points)
 
@@ -75,7 +75,7 @@ def test_units_of_trimesh(log, units, unit):
     mesh = from_object(given)
     assert mesh.materials.get("unit") == unit
     save(mesh, io.BytesIO(), file_format="glb")
-    assert ("GLB means meter" in log.text) == (unit == "millimeter")
+    assert ("GLB means metre" in log.text) == (unit == "millimeter")
 
 
 @pytest.mark.parametrize("attributes", [True, False])

@@ -28,7 +28,7 @@ def in_unit_of(mesh: Mesh, suffix: str, losses: Losses) -> Mesh:
     """
     unit = mesh.materials.get(UNIT)
     if suffix == ".glb" and isinstance(unit, str) and unit != OF_GLB:
-        losses.say(f"the unit {unit}: coordinates stay as they are, and GLB means {OF_GLB}")
+        losses.say(f"the unit {unit}: coordinates stay as they are, and GLB means metres")
     is_left_out = suffix == ".glb" or (suffix not in _WITH_UNITS and unit in (OF_3MF, OF_GLB))
     if not is_left_out or not isinstance(unit, str):
         return mesh
