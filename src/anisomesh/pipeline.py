@@ -161,7 +161,7 @@ def remesh(
         result = replace(result, warnings=cut.remarks)
     elif n_vertices is None and ratio is None:
         result = replace(result, warnings=(*lengths_beyond(prepared, options, max_error), *result.warnings))
-    return with_attributes(result, given, cut, options, run) if options.attributes else result
+    return with_attributes(result, given, cut, options, run)
 
 
 def cut_input(given: Mesh, options: RemeshOptions, run: Run, *, joined: bool = True, connected: bool = False) -> Cut:
@@ -174,9 +174,9 @@ def cut_input(given: Mesh, options: RemeshOptions, run: Run, *, joined: bool = T
 
 
 def with_attributes(result: RemeshResult, given: Mesh, cut: Cut, options: RemeshOptions, run: Run) -> RemeshResult:
-    """Return a result with everything that a mesh carries."""
-    if given.is_bare:
-        return result
+    """Return a result with everything that a mesh carries, without attributes with its unit."""
+    if given.is_bare or not options.attributes:
+        return replace(result, mesh=result.mesh.in_unit_of(given))
 
     def oriented(mesh: Mesh) -> Mesh:
         return oriented_as(mesh, result.prepared) if result.prepare_report.faces_flipped else mesh

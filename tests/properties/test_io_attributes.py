@@ -24,13 +24,15 @@ spec = importlib.util.spec_from_file_location("formats", ROOT / "benchmarks/form
 formats = importlib.util.module_from_spec(spec)
 spec.loader.exec_module(formats)
 
+METRES = "left out what GLB cannot hold: the unit millimeter: coordinates stay as they are"
+GREY = "they are grey"  # colours of materials in 3MF files that are not known
 WORDS = {  # what a warning says of a kind
     "point": "point data",
     "corner": "corner data",
     "face": "face data",
     "region": "regions",
     "feature": "feature edge",
-    "fixed": "fixed point",
+    "fixed": "fixed ",
 }
 
 
@@ -178,6 +180,7 @@ NAMES_ONLY = (".obj", ".stl", ".glb", ".3mf")
 def test_regions_without_names_keep_their_numbers(suffix, division, labels):
     mesh = Mesh(surface=formats.SURFACE, regions={division: Regions(np.resize(labels, formats.N_FACES))})
     read, warnings = formats.round_trip(mesh, suffix)
+    warnings = [text for text in warnings if suffix != ".3mf" or GREY not in text]
     if suffix in MEDIT and labels == (0,):  # no faces have references
         assert warnings == [f"stream: left out what MEDIT cannot hold: regions '{division}'"]
     else:
@@ -267,7 +270,7 @@ def test_data_survive_a_way_through_formats(kind, way):
     mesh = formats.MESHES[kind]
     for suffix in way.split():
         mesh, warnings = formats.round_trip(mesh, suffix)
-        assert warnings == []
+        assert [text for text in warnings if GREY not in text and METRES not in text] == []
     found = formats.kept(formats.MESHES[kind], mesh)
     assert found in (formats.EXACT, formats.ROUNDED, formats.NAMES)
     assert found != formats.NAMES or "regions" in kind

@@ -74,6 +74,8 @@ def test_a_mesh_says_what_it_carries_and_can_be_pickled():
     mesh = Mesh(surface=BOX, point_data={"t": np.zeros(26)}, fixed_points=[1, 2])
     assert repr(mesh) == "Mesh(Surface(26 points, 48 faces), 1 point_data, 2 fixed_points)"
     assert Mesh(surface=BOX).is_bare
+    assert Mesh(surface=BOX, materials={"unit": "meter"}).is_bare
+    assert not Mesh(surface=BOX, materials={"steel": 7.85}).is_bare
     assert not mesh.is_bare
     assert repr(pickle.loads(pickle.dumps(mesh))) == repr(mesh)
 

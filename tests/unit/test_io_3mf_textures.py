@@ -2,6 +2,7 @@
 
 import io
 import zipfile
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -16,6 +17,7 @@ BOX = box(n=2)
 N = BOX.n_faces
 UV = np.random.default_rng(0).random((N, 3, 2))
 LABELS = np.arange(N) % 3
+HELD = np.where((LABELS > 0)[:, None, None], UV, np.nan)  # of faces with a texture
 
 
 def image(colour, kind="PNG"):
@@ -33,7 +35,7 @@ def textured(names=None, textures=None, **more):
     regions = {"texture": Regions(LABELS, names), **more.pop("regions", {})}
     materials = {"textures": TEXTURES if textures is None else textures}
     return Mesh(
-        surface=BOX, corner_data={"uv": UV, **more.pop("corner_data", {})}, regions=regions, materials=materials
+        surface=BOX, corner_data={"uv": HELD, **more.pop("corner_data", {})}, regions=regions, materials=materials
     )
 
 
@@ -47,7 +49,7 @@ def test_textures_come_back_with_their_images(tmp_path, caplog):
     read = round_trip(textured(), tmp_path)
     assert read.regions["texture"].names == {1: "wood.png", 2: "stone.jpg"}
     np.testing.assert_array_equal(read.regions["texture"].labels, LABELS)
-    np.testing.assert_array_equal(read.corner_data["uv"], UV * (LABELS > 0)[:, None, None])
+    np.testing.assert_array_equal(read.corner_data["uv"], HELD)
     assert read.materials["textures"] == {
         1: {"contenttype": "image/png", "tilestyleu": "mirror", "filter": "nearest", "data": WOOD},
         2: {"contenttype": "image/jpeg", "data": STONE},
@@ -65,7 +67,9 @@ def test_textures_stand_beside_colours_and_materials_of_other_faces(tmp_path, ca
     oak = Regions(np.where(LABELS == 0, 1, 0), {1: "oak"})
     read = round_trip(textured(regions={"material": oak}), tmp_path)
     np.testing.assert_array_equal(read.regions["material"].labels, oak.labels)
-    assert caplog.text == ""
+    assert [record.message.partition(": ")[2] for record in caplog.records] == [
+        "left out what 3MF cannot hold: unknown colours of 1 of 1 material(s): they are grey"
+    ]
 
 
 @pytest.mark.parametrize(
@@ -129,7 +133,8 @@ def test_coordinates_of_files_of_others(tmp_path, caplog):
         archive.writestr("3D/Textures/a.png", WOOD)
     mesh = load_mesh(tmp_path / "a.3mf")
     assert mesh.surface.faces.tolist() == [[2, 1, 0]] * 3
-    assert mesh.corner_data["uv"].tolist() == [[[0, 0], [0, 0.25], [1, 2]], [[0.5, 0.5]] * 3, [[0.5, 0.5]] * 3]
+    expected = [[[np.nan, np.nan], [0, 0.25], [1, 2]], [[0.5, 0.5]] * 3, [[0.5, 0.5]] * 3]
+    np.testing.assert_array_equal(mesh.corner_data["uv"], expected)
     assert mesh.regions["texture"].labels.tolist() == [1, 1, 2]
     assert mesh.regions["texture"].names == {1: "a.png"}
     assert mesh.materials["textures"][1] == {"contenttype": "image/png", "tilestylev": "clamp", "data": WOOD}
@@ -147,3 +152,26 @@ def test_a_remesh_keeps_textures(tmp_path):
     read = round_trip(anisomesh.remesh(mesh, n_vertices=60, max_iterations=5).mesh, tmp_path)
     assert read.materials["textures"][1]["data"] == WOOD
     np.testing.assert_allclose(read.corner_data["uv"], read.surface.points[read.surface.faces][..., :2], atol=1e-9)
+
+
+def test_texture_coordinates_of_faces_without_a_texture_are_named(tmp_path, caplog):
+    """Regression: they were 0 in the file, and nothing was said."""
+    given = replace(textured(), corner_data={"uv": UV})
+    read = round_trip(given, tmp_path)
+    assert f"the uv of {np.count_nonzero(LABELS == 0)} face(s) without a texture" in caplog.text
+    np.testing.assert_array_equal(read.corner_data["uv"], HELD)
+    caplog.clear()
+    round_trip(replace(given, corner_data={"uv": np.nan_to_num(HELD)}), tmp_path)
+    assert caplog.text == ""
+
+
+def test_a_texture_without_texture_coordinates_is_named(tmp_path, caplog):
+    gaps = UV.copy()
+    gaps[LABELS == 2], gaps[1, 1] = np.nan, np.nan
+    read = round_trip(replace(textured(), corner_data={"uv": gaps}), tmp_path)
+    n_stone = np.count_nonzero(LABELS == 2)
+    assert f"the texture 'stone.jpg' at {n_stone} face(s), some corners of which have no uv" in caplog.text
+    assert "the texture 'wood.png' at 1 face(s), some corners of which have no uv" in caplog.text
+    held = (LABELS == 1) & (np.arange(N) != 1)
+    np.testing.assert_array_equal(read.regions["texture"].labels == 1, held)
+    np.testing.assert_array_equal(read.corner_data["uv"], np.where(held[:, None, None], UV, np.nan))

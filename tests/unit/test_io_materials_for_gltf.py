@@ -85,9 +85,9 @@ def test_textures_and_display_colours_of_3mf_are_in_glb(tmp_path, log):
     oak = Regions(np.where(LABELS == 0, 5, 0), {5: "oak"})
     given = Mesh(
         surface=BOX,
-        corner_data={"uv": UV},
+        corner_data={"uv": np.where((LABELS > 0)[:, None, None], UV, np.nan)},
         regions={"texture": Regions(LABELS, {1: "wood.png", 2: "stone.png"}), "material": oak},
-        materials={"textures": textures, "display_colours": {5: "#BC8040"}},
+        materials={"textures": textures, "display_colours": {5: "#BC8040"}, "unit": "meter"},
     )
     save(given, tmp_path / "a.3mf")
     save(load_mesh(tmp_path / "a.3mf"), tmp_path / "a.glb")
@@ -127,3 +127,38 @@ def test_a_broken_colour_or_texture_is_no_error(tmp_path, log):
     save(Mesh(surface=BOX, corner_data={"uv": UV}, regions=regions, materials=materials), tmp_path / "a.glb")
     assert "left out" in log.text
     assert load_mesh(tmp_path / "a.glb").surface.n_faces == BOX.n_faces
+
+
+@pytest.mark.parametrize("suffix", [".glb", ".3mf"])
+def test_options_of_textures_are_named(tmp_path, log, suffix):
+    """Regression: a texture was written without its scale and offset, and nothing was said."""
+    (tmp_path / "in").mkdir()
+    (tmp_path / "in" / "oak.png").write_bytes(image(PIXELS))
+    plain = "newmtl wood\nmap_Kd -s 1 1 1.0 -o 0 -clamp OFF -blendu on oak.png\nnewmtl red\nKd 1 0 0\n"
+    mesh = obj(tmp_path / "in", plain)
+    save(mesh, tmp_path / f"a{suffix}")
+    assert "the options" not in log.text
+    mesh = obj(tmp_path / "in", plain.replace("-s 1 1 1.0", "-s 2 2 -texres 64").replace("OFF", "on"))
+    save(mesh, tmp_path / f"a{suffix}")
+    assert "the options -clamp, -s, -texres of map_Kd of materials" in log.text
+
+
+@pytest.mark.parametrize(("suffix", "in_file"), [(".glb", True), (".glb", False), (".3mf", True)])
+def test_colours_are_unknown_without_a_material_file(tmp_path, log, suffix, in_file):
+    """Regression: materials 'obj' were said to be left out, and 3MF was grey without a line."""
+    given = obj(tmp_path / "in", "")
+    if not in_file:
+        given = load_mesh(io.BytesIO((tmp_path / "in" / "a.obj").read_bytes()), file_format="obj")
+    (tmp_path / "in" / "a.mtl").unlink()
+    mesh = load_mesh(tmp_path / "in" / "a.obj") if in_file else given
+    log.clear()
+    save(mesh, tmp_path / f"b{suffix}")
+    assert len(log.records) == 1
+    assert "the colours of materials, which are unknown since their .mtl files were not read" in log.text
+    assert "'obj'" not in log.text
+    assert ("unknown colours of 2 of 2 material(s): they are grey" in log.text) == (suffix == ".3mf")
+
+
+def test_materials_that_no_material_file_describes_are_named(tmp_path, log):
+    save(obj(tmp_path / "in", "newmtl wood\nKd 1 0 0\n"), tmp_path / "a.3mf")
+    assert "the colours of 'red', which its .mtl files do not describe" in log.text

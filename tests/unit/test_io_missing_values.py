@@ -5,10 +5,11 @@ import logging
 import numpy as np
 import pytest
 
-from anisomesh.attributes.model import Mesh
+from anisomesh.attributes.model import Mesh, Regions
 from anisomesh.io.known_formats import MESH_FORMATS
 from anisomesh.io.meshes import load_mesh, save
 from anisomesh.mesh.surface import Surface
+from anisomesh.shapes.analytic import box
 
 POINTS = np.array([(0, 0, 0), (1, 0, 0), (0, 1, 0), (1, 1, 0), (2, 2, 2)])
 SURFACE = Surface(POINTS, [[0, 1, 2], [1, 3, 2]])  # no face uses the last point
@@ -84,7 +85,7 @@ def test_faces_of_obj_with_texture_coordinates_and_normals_at_some_corners(tmp_p
     read = load_mesh(tmp_path / "a.obj")
     np.testing.assert_array_equal(read.surface.faces, surface.faces)
     np.testing.assert_array_equal(read.corner_data["normal"], normals)
-    np.testing.assert_array_equal(read.corner_data["uv"], np.where(np.isnan(uv), 0.0, uv))
+    np.testing.assert_array_equal(read.corner_data["uv"], uv)
 
 
 FIELDS = {
@@ -112,9 +113,38 @@ def test_integers_that_float64_does_not_hold_are_named_with_the_reason(tmp_path,
     assert "point data 'id', whose integers are too large for float64" in caplog.text
 
 
-def test_texture_coordinates_and_colours_of_3mf_with_nan_are_named_with_the_reason(tmp_path, caplog):
-    uv, colours = np.zeros((5, 2)), np.ones((5, 3))
-    uv[1], colours[:2] = np.nan, np.nan
-    save(Mesh(surface=SURFACE, point_data={"uv": uv, "color": colours}), tmp_path / "a.3mf")
-    assert "point data 'uv', which are NaN at 1 of 5 points" in caplog.text
+def test_colours_of_3mf_with_nan_are_named_with_the_reason(tmp_path, caplog):
+    colours = np.ones((5, 3))
+    colours[:2] = np.nan
+    save(Mesh(surface=SURFACE, point_data={"uv": np.zeros((5, 2)), "color": colours}), tmp_path / "a.3mf")
+    assert "point data 'uv'; point data 'color'" in caplog.text
     assert "point data 'color', which are NaN at 2 of 5 points" in caplog.text
+
+
+TRIANGLES = box(n=1)
+HAS_UV = np.arange(TRIANGLES.n_faces) < 5
+
+
+@pytest.mark.parametrize("suffix", [".glb", ".obj", ".ply", ".vtp"])
+def test_texture_coordinates_that_are_missing_stay_missing(tmp_path, suffix):
+    """Regression: they were read as 0, and GLB left out all of them if some were NaN."""
+    uv = np.random.default_rng(0).random((TRIANGLES.n_faces, 3, 2)).astype(np.float32).astype(np.float64)
+    uv = np.where(HAS_UV[:, None, None], uv, np.nan)
+    regions = {"material": Regions(HAS_UV.astype(int), {0: "plain", 1: "textured"})}
+    save(Mesh(surface=TRIANGLES, corner_data={"uv": uv}, regions=regions), tmp_path / f"a{suffix}")
+    read = load_mesh(tmp_path / f"a{suffix}")
+    rows = read.corner_data["uv"] if "uv" in read.corner_data else read.point_data["uv"][read.surface.faces]
+    middles = [surface.points[surface.faces].mean(axis=1).round(3) for surface in (read.surface, TRIANGLES)]
+    order = [np.lexsort(rows.T) for rows in middles]
+    found, given = rows[order[0]], uv[order[1]]
+    np.testing.assert_allclose(np.sort(found, axis=1), np.sort(given, axis=1), atol=1e-6)
+
+
+def test_glb_and_off_have_zero_where_some_texture_coordinates_are_missing(tmp_path, caplog):
+    """In one primitive of GLB all vertices have them, and so they do in OFF."""
+    uv = np.array([[0.25, 0.5], [0.5, 0.5], [np.nan, np.nan], [1.0, 1.0], [np.nan, np.nan]])
+    for suffix, count in ((".glb", "2 vertices"), (".off", "2 points")):
+        caplog.clear()
+        save(Mesh(surface=SURFACE, point_data={"uv": uv}), tmp_path / f"a{suffix}")
+        assert f"that {count} have no uv: they get 0" in caplog.text
+        np.testing.assert_allclose(load_mesh(tmp_path / f"a{suffix}").point_data["uv"], np.nan_to_num(uv))

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass, field, fields
+from dataclasses import dataclass, field, fields, replace
 from functools import cached_property
 from typing import Any
 
@@ -13,6 +13,9 @@ import numpy.typing as npt
 from anisomesh._arrays import EdgeEnds
 from anisomesh.errors import MeshError
 from anisomesh.mesh.surface import Surface
+
+UNIT = "unit"
+"""Key of the unit of length among the materials of a mesh."""
 
 _KINDS = "biufcSU"  # of dtypes: bools, integers, real and complex numbers, strings
 
@@ -150,8 +153,14 @@ class Mesh:
 
     @property
     def is_bare(self) -> bool:
-        """Whether the mesh carries nothing besides its surface."""
-        return not any(len(getattr(self, f.name)) for f in fields(self) if f.name != "surface")
+        """Whether the mesh carries nothing besides its surface and a unit of length."""
+        carried = (f.name for f in fields(self) if f.name not in ("surface", "materials"))
+        return not self.materials.keys() - {UNIT} and not any(len(getattr(self, name)) for name in carried)
+
+    def in_unit_of(self, other: Mesh) -> Mesh:
+        """Return the mesh with the unit of length of another one, if that has any."""
+        unit = {name: one for name, one in other.materials.items() if name == UNIT}
+        return replace(self, materials={**self.materials, **unit}) if unit else self
 
     @cached_property
     def parts(self) -> Ints:

@@ -36,6 +36,7 @@ class Losses:
         self._reasons: dict[tuple[str, str], str] = {}
         self._others: list[str] = []
         self._changed: list[str] = []
+        self._renamed: list[tuple[str, str]] = []
 
     def add(self, what: str, *names: str) -> None:
         """Add data of a kind, such as point data, with these names."""
@@ -54,6 +55,10 @@ class Losses:
     def changed(self, name: str) -> None:
         """Add a name that is written with other characters."""
         self._changed.append(name)
+
+    def renamed(self, name: str, text: str) -> None:
+        """Add a name that another region has too, and the text that is written for it."""
+        self._renamed.append((name, text))
 
     def features(self, mesh: Mesh) -> None:
         """Add the features and fixed points of a mesh, and their divisions."""
@@ -88,6 +93,9 @@ class Losses:
             parts += [f"{what} {name!r}, {why}" for name in names if name and (why := self._reasons.get((what, name)))]
         if self._changed:
             parts.append(f"some characters of {len(self._changed)} name(s) such as {self._changed[0]!r}")
+        if self._renamed:
+            name, text = self._renamed[0]
+            parts.append(f"equal names of {len(self._renamed)} region(s) such as {name!r}, which is {text!r} there")
         return "; ".join([*parts, *self._others])
 
 

@@ -18,11 +18,10 @@ from anisomesh.io.assemble import as_mesh
 from anisomesh.io.atomic import atomic_path
 from anisomesh.io.convert import from_object
 from anisomesh.io.formats.words import BYTE_ORDER_MARK
-from anisomesh.io.holding import Losses, without_unnamed
-from anisomesh.io.known_formats import READERS, TEXT_FORMATS, WRITERS, known_suffix
+from anisomesh.io.holding import Losses
+from anisomesh.io.known_formats import READERS, TEXT_FORMATS, known_suffix
 from anisomesh.io.materials import files as material_files
-from anisomesh.io.materials import from_gltf
-from anisomesh.io.materials.for_gltf import with_gltf_materials
+from anisomesh.io.materials.content import file_content, warn_of_losses
 from anisomesh.mesh.surface import Surface
 
 logger = logging.getLogger(__name__)
@@ -215,52 +214,6 @@ def save(
         with atomic_path(name) as temporary:
             temporary.write_bytes(content)
     warn_of_losses(name, suffix, losses)
-
-
-def file_content(mesh: Mesh, name: str, suffix: str, losses: Losses, *, in_file: bool = True) -> bytes:
-    """Return the content of a mesh file; the material file of an OBJ file is written beside it.
-
-    Parameters
-    ----------
-    mesh
-        The mesh.
-    name
-        The name of the file, or of a stream for messages.
-    suffix
-        The extension of the format.
-    losses
-        What is left out is added here.
-    in_file
-        Whether it is a file and not a stream.
-
-    Raises
-    ------
-    MeshFileError
-        If the format cannot hold the mesh.
-    """
-    folder, mesh = material_files.folder_of(name) if in_file else Path.cwd(), without_unnamed(mesh, losses)
-    mesh = material_files.with_texture_names(mesh, lambda name: material_files.relative_name(name, folder))
-    looks: dict[int, from_gltf.Look] = {}
-    if suffix == ".glb":
-        mesh = with_gltf_materials([mesh], losses)[0]
-    elif suffix == ".3mf":
-        mesh = from_gltf.with_3mf_materials(mesh, losses)
-    elif suffix == ".obj" and in_file:
-        mesh, looks = from_gltf.with_obj_materials(mesh, losses)
-    try:
-        content = WRITERS[suffix](mesh, losses)
-    except ValueError as error:
-        raise MeshFileError(f"{name}: cannot be written: {error}") from error
-    if suffix == ".obj" and not looks:
-        return material_files.write_beside(content, mesh, Path(name) if in_file else None, losses)
-    return from_gltf.write_obj_library(looks, Path(name), losses) + content if looks else content
-
-
-def warn_of_losses(name: str, suffix: str, losses: Losses) -> None:
-    """Log what was left out of a file, if anything was."""
-    if losses.text():
-        format_name = "MEDIT" if suffix in (".mesh", ".meshb") else suffix[1:].upper()
-        logger.warning("%s: left out what %s cannot hold: %s", name, format_name, losses.text())
 
 
 def _with_point_data(mesh: Mesh, path: str, point_data: PointData) -> Mesh:

@@ -10,11 +10,9 @@ from anisomesh.attributes.model import Mesh
 from anisomesh.errors import MeshFileError
 from anisomesh.io.atomic import atomic_paths
 from anisomesh.io.formats.gltf.write import glb_levels_bytes
-from anisomesh.io.holding import Losses, without_unnamed
+from anisomesh.io.holding import Losses
 from anisomesh.io.known_formats import known_suffix
-from anisomesh.io.materials import files as material_files
-from anisomesh.io.materials.for_gltf import with_gltf_materials
-from anisomesh.io.meshes import file_content, warn_of_losses
+from anisomesh.io.materials.content import file_content, levels_for_glb, warn_of_losses
 
 
 def level_paths(path: str | os.PathLike[str], count: int, file_format: str | None = None) -> list[Path]:
@@ -70,14 +68,7 @@ def save_meshes(meshes: Sequence[Mesh], path: str | os.PathLike[str], *, file_fo
 
 
 def _glb_content(meshes: Sequence[Mesh], path: Path, losses: Losses) -> bytes:
-    folder = material_files.folder_of(path)
-    named = [
-        material_files.with_texture_names(
-            without_unnamed(mesh, losses), lambda name: material_files.relative_name(name, folder)
-        )
-        for mesh in meshes
-    ]
     try:
-        return glb_levels_bytes(with_gltf_materials(named, losses), losses)
+        return glb_levels_bytes(levels_for_glb(meshes, path, losses), losses)
     except ValueError as error:
         raise MeshFileError(f"{path}: cannot be written: {error}") from error

@@ -94,7 +94,7 @@ def remesh_levels(
         except TimeLimitError as error:
             raise TimeLimitError(f"level {k} has its share of the time limit of {total.limit:g} s: {error}") from error
         result = replace(level.result, warnings=cut.remarks) if cut.is_all else level.result
-        results.append(with_attributes(result, given, cut, options, run) if options.attributes else result)
+        results.append(with_attributes(result, given, cut, options, run))
         logger.info("level %d: %r", k, results[-1])
     return Levels(tuple(results))
 

@@ -24,8 +24,7 @@ def command(
     """Describe a mesh: size, topology, what it carries, defects, the repairs before a remesh; - is standard input."""
     check_input_format(source, input_format)
     mesh = read_mesh(source, input_format)[0]
-    suffix = "." + (input_format or source.suffix).lower().removeprefix(".")
-    facts = describe(mesh.surface) | contents(mesh, suffix) | {"file": str(source)}
+    facts = describe(mesh.surface) | contents(mesh) | {"file": str(source)}
     typer.echo(as_json(facts) if json_ else _text(facts))
 
 

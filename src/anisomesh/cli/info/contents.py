@@ -6,6 +6,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from anisomesh.attributes.model import UNIT
 from anisomesh.cli.report import counted
 
 if TYPE_CHECKING:
@@ -15,18 +16,14 @@ if TYPE_CHECKING:
 
 _MAX_NAMED = 6  # regions of a division in a line of text
 _DATA_TITLES = {"point_data": "point data", "face_data": "face data", "corner_data": "corner data"}
-_UNIT_OF_FORMAT = {".3mf": "millimeter", ".glb": "meter"}  # where the file names none, by specification
 
 
-def contents(mesh: Mesh, suffix: str) -> dict[str, Any]:
-    """Return what a mesh carries, for JSON: lengths in model units, areas in their square.
-
-    ``suffix`` is the extension of the format, in lower case with the dot.
-    """
+def contents(mesh: Mesh) -> dict[str, Any]:
+    """Return what a mesh carries, for JSON: lengths in model units, areas in their square."""
     ends = mesh.surface.points[mesh.features]
-    unit = mesh.materials.get("unit")
+    unit = mesh.materials.get(UNIT)
     return {
-        "unit": unit if isinstance(unit, str) else _UNIT_OF_FORMAT.get(suffix),
+        "unit": unit if isinstance(unit, str) else None,
         "regions": {name: _regions(regions, mesh.surface.face_areas) for name, regions in mesh.regions.items()},
         **{kind: _arrays(getattr(mesh, kind), 2 if kind == "corner_data" else 1) for kind in _DATA_TITLES},
         "prescribed_edges": {
@@ -37,7 +34,7 @@ def contents(mesh: Mesh, suffix: str) -> dict[str, Any]:
         "fixed_points": len(mesh.fixed_points),
         "fixed_faces": len(mesh.fixed_faces),
         "point_regions": _marked(mesh.fixed_point_regions, "points"),
-        "materials": sorted(mesh.materials),
+        "materials": sorted(mesh.materials.keys() - {UNIT}),
     }
 
 
@@ -86,9 +83,8 @@ def contents_rows(facts: dict[str, Any]) -> list[tuple[str, str]]:
     if facts["fixed_faces"]:
         rows.append(("fixed", counted(facts["fixed_faces"], "face")))
     rows += _region_rows("fixed", facts["point_regions"])
-    others = [name for name in facts["materials"] if name != "unit"]
-    if others:
-        rows.append(("materials", ", ".join(others)))
+    if facts["materials"]:
+        rows.append(("materials", ", ".join(facts["materials"])))
     return rows
 
 

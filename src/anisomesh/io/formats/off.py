@@ -101,6 +101,8 @@ def off_bytes(mesh: Mesh, losses: Losses) -> bytes:
             losses.because("point data", name, "which have no length")
             del point_data[name]
         elif columns is not None:
+            if name == UV:
+                columns = (_without_gaps(columns[0], losses), columns[1])
             parts.append(columns[0])
             pattern, head = pattern + columns[1], letters + head
             del point_data[name]
@@ -114,6 +116,14 @@ def off_bytes(mesh: Mesh, losses: Losses) -> bytes:
     losses.add("materials", *mesh.materials)
     losses.features(mesh)
     return f"{head}OFF\n{len(points)} {len(faces)} 0\n{vertices}{triangles}".encode()
+
+
+def _without_gaps(uv: Array, losses: Losses) -> Array:
+    """Return texture coordinates (V, 2) with 0 where they are missing."""
+    lacking = np.asarray(np.isnan(uv).any(axis=1))
+    if lacking.any():
+        losses.say(f"that {np.count_nonzero(lacking):,} points have no {UV}: they get 0")
+    return np.where(lacking[:, None], 0.0, uv)
 
 
 def _columns(values: Array | None, widths: tuple[int, ...]) -> tuple[Array, str] | None:

@@ -69,8 +69,11 @@ def region_texts(
     for label in np.unique(regions.labels).tolist():
         name = regions.names.get(label, "")
         text = written(name) or f"{_NUMBERED}{label}"
-        texts[label] = f"{text}_{label}" if distinct and text in texts.values() else text
-        if name and texts[label] != name:
+        is_taken = distinct and text in texts.values()
+        texts[label] = f"{text}_{label}" if is_taken else text
+        if name and is_taken:
+            losses.renamed(name, texts[label])
+        elif name and text != name:
             losses.changed(name)
     losses.add(EMPTY_REGIONS, *empty_regions(regions))
     return texts

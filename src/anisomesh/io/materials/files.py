@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import os
-import re
 from collections.abc import Callable, Mapping
 from dataclasses import replace
 from pathlib import Path
@@ -14,9 +13,10 @@ from anisomesh.attributes.model import Mesh
 from anisomesh.io.atomic import atomic_path
 from anisomesh.io.formats.obj.attributes import LIBRARIES
 from anisomesh.io.holding import Losses
+from anisomesh.io.materials import textures
+from anisomesh.io.materials.textures import absolute_name, is_file, is_in_text
 
 _MARK = "# materials of a mesh that anisomesh has written\n"
-_TEXTURE = re.compile(r"\s*(?:map_\w+|bump|disp|decal|refl|norm)\s", re.IGNORECASE)
 
 
 def read_beside(mesh: Mesh, path: Path) -> tuple[Mesh, tuple[str, ...]]:
@@ -33,7 +33,7 @@ def read_beside(mesh: Mesh, path: Path) -> tuple[Mesh, tuple[str, ...]]:
             if file.suffix.lower() != ".mtl":
                 raise OSError("expected a .mtl file")
             text = file.read_text(encoding="utf-8", errors="surrogateescape")
-            texts.append(text if file.parent == folder else _moved(text, file.parent, folder))
+            texts.append(text if file.parent == folder else textures.moved(text, file.parent, folder, Losses()))
         except (OSError, ValueError) as error:
             losses.append(f"left out the materials of {name!r}: {getattr(error, 'strerror', None) or error}")
     found = {**given, "text": "\n".join(texts), "folder": str(folder)} if texts else given
@@ -62,23 +62,23 @@ def with_texture_names(mesh: Mesh, rename: Callable[[str], str]) -> Mesh:
 
 def is_file_name(image: Mapping[str, Any]) -> bool:
     """Return whether an image is in a file, not in a view or in the text itself."""
-    return isinstance(image.get("uri"), str) and not re.match(r"[a-zA-Z][a-zA-Z+.-]+:", image["uri"])
+    return isinstance(image.get("uri"), str) and not is_in_text(image["uri"])
 
 
-def absolute_name(name: str, folder: Path) -> str:
-    """Return the absolute name of a file that a name refers to in a folder; the same name if there is none."""
-    try:
-        return str((folder / name).resolve()) if (folder / name).is_file() else name
-    except (OSError, ValueError):  # too long, or not a name
+def say_missing_textures(mesh: Mesh, suffix: str, losses: Losses) -> None:
+    """Add to the losses the files of textures that are missing, of the ones that a format names.
+
+    ``suffix`` is the extension of the format. A name is known to be from a folder if it is absolute.
+    """
+    names: list[str] = []
+
+    def take(name: str) -> str:
+        names.append(name)
         return name
 
-
-def relative_name(name: str, folder: Path) -> str:
-    """Return the name from a folder of a file with an absolute name; the same name for others."""
-    try:
-        return os.path.relpath(name, folder).replace(os.sep, "/") if Path(name).is_absolute() else name
-    except ValueError:  # on another drive
-        return name
+    key = {".ply": "texture_files", ".glb": "gltf", ".obj": "gltf"}.get(suffix)
+    with_texture_names(replace(mesh, materials={k: one for k, one in mesh.materials.items() if k == key}), take)
+    textures.say_missing((Path(n).name for n in names if Path(n).is_absolute() and not is_file(Path(n))), losses)
 
 
 def _names(libraries: tuple[str, ...], folder: Path) -> list[str]:
@@ -117,7 +117,7 @@ def write_beside(content: bytes, mesh: Mesh, path: Path | None, losses: Losses) 
         if "text" in given:
             losses.say("the content of material files, since a stream has no folder; it only names them")
     elif str(folder := folder_of(path)) != given.get("folder", ""):
-        libraries = (write_library(_moved(given["text"], Path(given.get("folder", "")), folder), path),)
+        libraries = (write_library(textures.moved(given["text"], Path(given.get("folder", "")), folder, losses), path),)
     lines = "".join(f"{LIBRARIES} {name}\n" for name in libraries)
     return lines.encode("utf-8", errors="replace") + content
 
@@ -138,38 +138,3 @@ def _free_name(folder: Path, stem: str) -> Path:
         if not target.exists() or (target.is_file() and target.read_bytes().startswith(_MARK.encode())):
             return target
         number += 1
-
-
-def referred_file(line: str, folder: Path) -> Path | None:
-    """Return the file that a line of materials names, from a folder or absolutely; None if there is none."""
-    for spelling in (line, line.replace("\\", "/")):  # backslashes of Windows
-        place = _texture_name(spelling, folder, absolute=True)
-        if place is not None:
-            return folder / spelling[place:].strip()
-    return None
-
-
-def _moved(text: str, old: Path, new: Path) -> str:
-    """Return materials with the textures that are found from the old folder named from the new one."""
-    lines = []
-    for line in text.splitlines():
-        for spelling in (line, line.replace("\\", "/")) if _TEXTURE.match(line) else ():  # backslashes of Windows
-            place = _texture_name(spelling, old)
-            if place is not None:
-                line = spelling[:place] + relative_name(str(old / spelling[place:].strip()), new)
-                break
-        lines.append(line)
-    return "\n".join([*lines, ""])
-
-
-def _texture_name(line: str, folder: Path, *, absolute: bool = False) -> int | None:
-    """Return where the name of an existing file begins that ends a line, after options and their values."""
-    starts = [match.end() for match in re.finditer(r"\s+", line.rstrip())]
-    for start in starts:
-        name = line[start:].strip()
-        try:
-            if name and (absolute or not Path(name).is_absolute()) and (folder / name).is_file():
-                return start
-        except (OSError, ValueError):
-            continue
-    return None

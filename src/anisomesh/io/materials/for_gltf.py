@@ -10,12 +10,14 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from anisomesh.attributes.model import Mesh, Regions
+from anisomesh.io.carried import listed
 from anisomesh.io.formats.gltf.read import MATERIAL, NO_MATERIAL
+from anisomesh.io.formats.obj.attributes import LIBRARIES
 from anisomesh.io.formats.region_names import in_words, region_texts
 from anisomesh.io.formats.threemf.properties import TEXTURE, TEXTURES
 from anisomesh.io.formats.threemf.textures import image_kind
 from anisomesh.io.holding import Losses
-from anisomesh.io.materials.files import referred_file
+from anisomesh.io.materials.textures import texture_line
 
 DISPLAYED = "display_colours"
 """Key of the display colours of 3MF by the labels of base materials."""
@@ -52,6 +54,7 @@ def with_gltf_materials(meshes: Sequence[Mesh], losses: Losses) -> list[Mesh]:
     -----
     A texture takes the place of the colour of its material, and a 3MF texture the one of a base material.
     """
+    meshes = [_without_unread(mesh, losses if mesh is meshes[0] else Losses()) for mesh in meshes]
     first = meshes[0]
     looks = {} if _OWN & first.materials.keys() else _looks_of_obj(first, losses) or _looks_of_3mf(first, losses)
     if not looks:
@@ -63,6 +66,16 @@ def with_gltf_materials(meshes: Sequence[Mesh], losses: Losses) -> list[Mesh]:
         losses.say(f"the materials of {np.count_nonzero(both[0] & both[1])} face(s) that have a texture")
     gltf = _as_gltf(list(names.values()), list(looks.values()))
     return [_numbered(mesh, list(looks), names, gltf) for mesh in meshes]
+
+
+def _without_unread(mesh: Mesh, losses: Losses) -> Mesh:
+    """Return a mesh without the names of .mtl files whose content is not known; the same mesh if it has none."""
+    obj = mesh.materials.get("obj")
+    if not isinstance(obj, Mapping) or LIBRARIES not in obj or "text" in obj:
+        return mesh
+    if MATERIAL in mesh.regions:
+        losses.say("the colours of materials, which are unknown since their .mtl files were not read")
+    return replace(mesh, materials={name: one for name, one in mesh.materials.items() if name != "obj"})
 
 
 def _numbered(mesh: Mesh, keys: list[tuple[str, int]], names: dict[int, str], gltf: dict[str, Any]) -> Mesh:
@@ -107,20 +120,27 @@ def _looks_of_obj(mesh: Mesh, losses: Losses) -> _Looks:
             lines = told.setdefault(in_words(rest), {})
         elif word and not word.startswith("#"):
             lines[word] = line
-    looks, others = {}, set[str]()
-    for label in _labels(regions):
-        given = {word.lower(): line for word, line in told.get(regions.names.get(label, ""), {}).items()}
+    looks, others, options = {}, set[str](), set[str]()
+    names = {label: regions.names.get(label, "") for label in _labels(regions)}
+    if unknown := [name for name in names.values() if name and name not in told]:
+        losses.say(f"the colours of {listed(list(map(repr, unknown)))}, which its .mtl files do not describe")
+    for label, name in names.items():
+        given = {word.lower(): line for word, line in told.get(name, {}).items()}
         colour = _numbers(given.pop("kd", ""))
         opacity = [*_numbers(given.pop("d", "")), *(1.0 - t for t in _numbers(given.pop("tr", ""))), 1.0][0]
         image = b""
         if "map_kd" in given:
-            file = referred_file(given.pop("map_kd"), folder)
-            image = _held_image(None if file is None else file.read_bytes(), regions, label, losses)
+            texture = texture_line(given.pop("map_kd"), folder)
+            data = None if texture is None or texture.file is None else texture.file.read_bytes()
+            image = _held_image(data, regions, label, losses)
+            options.update(() if texture is None else texture.options)
         of_colour = (1.0, 1.0, 1.0) if image else colour if len(colour) == 3 else ()
         looks[MATERIAL, label] = _Look((*of_colour, opacity) if of_colour else (), image)
         others |= given.keys()
     if others:
         losses.say(f"the statements {', '.join(sorted(others))} of materials")
+    if options:
+        losses.say(f"the options {', '.join(sorted(options))} of map_Kd of materials")
     return looks
 
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import base64
 import re
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
 from typing import Any, NamedTuple
@@ -20,13 +20,14 @@ from anisomesh.io.formats.obj.attributes import LIBRARIES
 from anisomesh.io.formats.region_names import in_words, is_number
 from anisomesh.io.formats.threemf.properties import TEXTURE, TEXTURES
 from anisomesh.io.formats.threemf.textures import image_kind
-from anisomesh.io.holding import Losses
+from anisomesh.io.holding import EMPTY_REGIONS, Losses
 from anisomesh.io.materials.files import is_file_name, write_library
 from anisomesh.io.materials.for_gltf import DISPLAYED, FILTERS, WRAPS, with_gltf_materials
 from anisomesh.io.objects.trimesh_scenes import TRIMESH
 
 _COLOUR, _TEXTURED = "baseColorFactor", "baseColorTexture"
 _PHYSICAL = "pbrMetallicRoughness"
+_MOVED = "KHR_texture_transform"
 _NO_WORDS = {"", "."}  # no names of files
 _NOT_IN_FILE_NAMES = re.compile(r"[^\w.-]+")
 _SUFFIXES = {"image/png": ".png", "image/jpeg": ".jpg"}
@@ -67,16 +68,44 @@ def looks_of(mesh: Mesh, losses: Losses) -> dict[int, Look]:
     tables = [table if isinstance(table, Mapping) else {} for table in given]
     if regions is None or not any(_physical(table).keys() & {_COLOUR, _TEXTURED} for table in tables):
         return {}
+    used = set(np.unique(regions.labels).tolist())
     names: dict[int, str] = {}
     for label, table in enumerate(tables):
         name = in_words(regions.names.get(label, "") or str(table.get("name", ""))) or f"region_{label}"
         names[label] = f"{name}_{label}" if name in names.values() else name
+        if names[label] != name and label in used:
+            losses.renamed(name, names[label])
     looks = {label: _look(names[label], table, gltf, losses) for label, table in enumerate(tables)}
+    _say_others([table for label, table in enumerate(tables) if label in used], losses)
+    return looks
+
+
+def without_mere_names(mesh: Mesh, losses: Losses) -> Mesh:
+    """Return a mesh without materials of glTF if these have neither colours nor textures: regions have their names.
+
+    Their other properties are added to the losses.
+    """
+    regions, gltf = mesh.regions.get(MATERIAL), mesh.materials.get("gltf")
+    if regions is None or not isinstance(gltf, Mapping) or gltf.get("images"):
+        return mesh
+    tables = [table if isinstance(table, Mapping) else {} for table in gltf.get("materials", [])]
+    if any(_physical(table).keys() & {_COLOUR, _TEXTURED} for table in tables):
+        return mesh
     used = set(np.unique(regions.labels).tolist())
-    others = sorted({key for label, table in enumerate(tables) if label in used for key in _others(table)})
+    _say_others([table for label, table in enumerate(tables) if label in used], losses)
+    names = {label: str(table["name"]) for label, table in enumerate(tables) if table.get("name")}
+    losses.add(EMPTY_REGIONS, *(name for label, name in names.items() if label not in used))
+    given = {label: name for label, name in names.items() if label in used}
+    materials = {name: one for name, one in mesh.materials.items() if name != "gltf"}
+    divisions = {**mesh.regions, MATERIAL: Regions(regions.labels, {**given, **regions.names})}
+    return replace(mesh, regions=divisions, materials=materials)
+
+
+def _say_others(tables: Sequence[Mapping[str, Any]], losses: Losses) -> None:
+    """Add to the losses the properties of materials that looks do not have."""
+    others = sorted({key for table in tables for key in _others(table)})
     if others:
         losses.say(f"the properties {', '.join(others)} of materials")
-    return looks
 
 
 def _physical(table: Mapping[str, Any]) -> Mapping[str, Any]:
@@ -86,7 +115,12 @@ def _physical(table: Mapping[str, Any]) -> Mapping[str, Any]:
 
 def _others(table: Mapping[str, Any]) -> Iterator[str]:
     """Yield the properties of a material that its look does not have, unless they are as of matt surfaces."""
-    yield from (key for key in table if key not in ("name", _PHYSICAL, "alphaMode", "doubleSided", "extras"))
+    usual: dict[str, tuple[Any, ...]] = {
+        "alphaMode": ("OPAQUE", "BLEND"),
+        "doubleSided": (False,),
+        "extras": ({}, [], None),
+    }
+    yield from (key for key in table if key not in ("name", _PHYSICAL) and table[key] not in usual.get(key, ()))
     for key, value in _physical(table).items():
         if key not in (_COLOUR, _TEXTURED) and (key, value) not in (("metallicFactor", 0), ("roughnessFactor", 1)):
             yield key
@@ -103,8 +137,10 @@ def _look(name: str, table: Mapping[str, Any], gltf: Mapping[str, Any], losses: 
         return look
     try:
         texture = physical[_TEXTURED]
-        if texture.get("texCoord", 0) or "extensions" in texture:
+        if texture.get("texCoord", 0):
             raise ValueError("it has texture coordinates of its own")
+        if others := texture.get("extensions", {}):
+            raise ValueError("it has a texture transform" if _MOVED in others else f"it has {', '.join(others)}")
         found = gltf["textures"][texture["index"]]
         samplers = gltf.get("samplers", [])
         sampler = samplers[found["sampler"]] if "sampler" in found else {}
@@ -143,7 +179,7 @@ def with_obj_materials(mesh: Mesh, losses: Losses) -> tuple[Mesh, dict[int, Look
     given, mesh = mesh, with_gltf_materials([mesh], losses)[0]
     looks = looks_of(mesh, losses)
     if not looks:
-        return given, {}
+        return without_mere_names(given, losses), {}
     regions = mesh.regions[MATERIAL]
     present = set(np.unique(regions.labels).tolist())
     names = {**regions.names, **{label: look.name for label, look in looks.items() if label in present}}
@@ -209,10 +245,10 @@ def with_3mf_materials(mesh: Mesh, losses: Losses) -> Mesh:
     """
     if mesh.materials.keys() & {DISPLAYED, TEXTURES}:
         return mesh
-    given, mesh = mesh, with_gltf_materials([mesh], losses)[0]
+    mesh = with_gltf_materials([mesh], losses)[0]
     looks = looks_of(mesh, losses)
     if not looks:
-        return given
+        return without_mere_names(mesh, losses)
     elsewhere = [look.name for look in looks.values() if look.file and not look.image]
     if elsewhere:
         losses.say(f"the textures of {', '.join(map(repr, elsewhere))}, which are in other files")

@@ -9,6 +9,7 @@ from typing import Any
 
 import numpy as np
 
+from anisomesh.attributes.model import UNIT
 from anisomesh.io.carried import COLOUR, UV, Array, Carried
 from anisomesh.io.cells import SurfaceCells
 from anisomesh.io.formats.gltf.attributes import Attributes
@@ -22,7 +23,10 @@ TRIMESH = "trimesh"
 """Key of the materials of trimesh by their labels."""
 
 _NAMED_BY_TRIMESH = re.compile(r"(geometry|material)_\d+")
-_PLURALS = {"inches": "inch", "feet": "foot"}  # plurals that do not end in one s
+_UNIT_NAMES = {  # other names than plurals that end in one s
+    **{"inches": "inch", "feet": "foot", "in": "inch", "ft": "foot"},
+    **{"m": "meter", "cm": "centimeter", "mm": "millimeter"},
+}
 
 
 def scene_soup(mesh: Any) -> PolygonSoup:
@@ -39,8 +43,8 @@ def scene_soup(mesh: Any) -> PolygonSoup:
         for node in mesh.graph.nodes_geometry:
             matrix, name = mesh.graph[node]
             parts.add(mesh.geometry[name], matrix, str(node))
-    units = str(getattr(mesh, "units", None) or "millimeter")
-    return parts.soup(_PLURALS.get(units, units.removesuffix("s")))
+    units = str(getattr(mesh, "units", None) or "")
+    return parts.soup(_UNIT_NAMES.get(units, units.removesuffix("s")))
 
 
 class _Parts:
@@ -93,7 +97,7 @@ class _Parts:
         return np.asarray(np.array(labels)[member])
 
     def soup(self, unit: str) -> PolygonSoup:
-        """Return everything, in this unit of length."""
+        """Return everything, in this unit of length, empty if it is not known."""
         carried = self._carried
         carried.point_data |= self._point_data.together(carried)
         for name, values in self._face_data.together(carried, "faces").items():
@@ -107,8 +111,8 @@ class _Parts:
             names = {k: name for k, name in given.items() if name and not _NAMED_BY_TRIMESH.fullmatch(name)}
             carried.add_cell_data(MATERIAL, np.concatenate(self._labels), names=names)
             carried.materials[TRIMESH] = dict(enumerate(self._materials))
-        if unit != "millimeter":
-            carried.materials["unit"] = unit
+        if unit:
+            carried.materials[UNIT] = unit
         return self._cells.soup(np.concatenate(self._points), tuple(self._remarks), carried)
 
 

@@ -10,12 +10,13 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from anisomesh.attributes.model import Mesh, Regions
+from anisomesh.attributes.model import UNIT, Mesh, Regions
 from anisomesh.io.carried import COLOUR, UV, Array, Integers
 from anisomesh.io.formats.gltf.read import MATERIAL, NODE
 from anisomesh.io.formats.gltf.write import glb_bytes
 from anisomesh.io.formats.gmsh.elements import PHYSICAL
 from anisomesh.io.formats.region_names import region_texts
+from anisomesh.io.formats.units import in_unit_of
 from anisomesh.io.formats.vtk.data import ORIGINAL_POINT, blank_rows
 from anisomesh.io.formats.vtk.write import active_names, vtk_polygons
 from anisomesh.io.holding import (
@@ -26,6 +27,7 @@ from anisomesh.io.holding import (
     continuous_corner_data,
     with_points_repeated,
 )
+from anisomesh.io.materials.from_gltf import without_mere_names
 from anisomesh.io.objects.read import CELL_SET, MESHIO_DIVISIONS
 from anisomesh.io.objects.trimesh_scenes import TRIMESH
 from anisomesh.mesh.surface import Surface
@@ -53,7 +55,7 @@ def to_pyvista(mesh: Mesh) -> Any:
     """
     pyvista, numpy_support = import_module("pyvista"), import_module("vtkmodules.util.numpy_support")
     losses = Losses()
-    mesh, (cells, (point_data, cell_data, fields)) = vtk_polygons(mesh, losses)
+    mesh, (cells, (point_data, cell_data, fields)) = vtk_polygons(_plain(mesh, losses), losses)
     data = pyvista.PolyData.from_regular_faces(mesh.surface.points, mesh.surface.faces)
     for name, section in (("verts", "Verts"), ("lines", "Lines")):
         rows = cells[section]
@@ -102,7 +104,7 @@ def to_meshio(mesh: Mesh) -> Any:
         theirs.get(name, name): [kind.labels(name) for kind in kinds] for name in names if not name.startswith(CELL_SET)
     }
     losses.add("face data", *(name for name in mesh.face_data if name in labels))
-    losses.add("materials", *mesh.materials)
+    losses.add("materials", *_plain(mesh, losses).materials)
     losses.fixed_faces(mesh)
     blank = {
         name: [values, *(blank_rows(values, len(kind.nodes)) for kind in kinds[1:])]
@@ -118,6 +120,11 @@ def to_meshio(mesh: Mesh) -> Any:
     )
     _warn("meshio", losses)
     return result
+
+
+def _plain(mesh: Mesh, losses: Losses) -> Mesh:
+    """Return a mesh for libraries without units and materials, without what is not said to be left out."""
+    return in_unit_of(without_mere_names(mesh, losses), "", losses)
 
 
 class _Cells(NamedTuple):
@@ -183,7 +190,7 @@ def to_trimesh(mesh: Mesh) -> Any:
     nodes, materials, table = mesh.regions.get(NODE), mesh.regions.get(MATERIAL), _trimesh_materials(mesh)
     others = [name for name in mesh.regions if name not in (NODE, MATERIAL)]
     losses.names_of_regions(mesh, *others)
-    held = ["unit", *(name for name in (TRIMESH, "gltf") if isinstance(mesh.materials.get(name), Mapping))]
+    held = [UNIT, *(name for name in (TRIMESH, "gltf") if isinstance(mesh.materials.get(name), Mapping))]
     losses.add("materials", *(name for name in mesh.materials if name not in held))
     none = np.zeros(mesh.surface.n_faces, dtype=np.int64)
     texts = {} if nodes is None else region_texts(nodes, losses, distinct=True)
@@ -196,8 +203,8 @@ def to_trimesh(mesh: Mesh) -> Any:
     _warn("trimesh", losses)
     is_scene = len(scene.geometry) > 1 or nodes is not None
     found = scene if is_scene else next(iter(scene.geometry.values()))
-    if isinstance(mesh.materials.get("unit"), str):
-        found.units = mesh.materials["unit"]
+    if isinstance(mesh.materials.get(UNIT), str):
+        found.units = mesh.materials[UNIT]
     return found
 
 
@@ -229,6 +236,9 @@ def _trimesh_part(mesh: Mesh, chosen: Integers, material: Any) -> Any:
     of_faces = {name: values[chosen] for name, values in mesh.face_data.items()}
     visual, count = None, len(chosen)
     uv = of_points.get(UV)
+    if uv is not None and uv.dtype.kind == "f" and np.isnan(uv).all():
+        del of_points[UV]  # of faces without a texture
+        uv = None
     if material is not None or uv is not None:
         visual = trimesh.visual.TextureVisuals(uv=of_points.pop(UV, None), material=material)
     elif COLOUR in of_points:

@@ -14,7 +14,10 @@ from anisomesh.io.holding import has_direction, share_not_finite
 from anisomesh.mesh.geometry import unit
 
 TANGENT = "tangent"
-_OURS = {"TEXCOORD": UV, "COLOR": COLOUR}  # of numbered sets, the first of which has no number
+TEXTURE_COORDINATES = "TEXCOORD"
+"""How names of texture coordinates begin in glTF."""
+
+_OURS = {TEXTURE_COORDINATES: UV, "COLOR": COLOUR}  # of numbered sets, the first of which has no number
 _SKIN = re.compile(r"(JOINTS|WEIGHTS)_\d+")
 _SET = re.compile(rf"({UV}|{COLOUR})(\d*)")
 _LARGEST_IN_FLOAT32 = 2**24  # up to it every integer has a float32
@@ -87,7 +90,7 @@ class Attributes:
 
     def _filled(self, name: str, example: Array) -> Array:
         """Return an attribute of all vertices, of the width of an example."""
-        fill = np.nan if example.dtype.kind == "f" and not name.startswith((UV, "WEIGHTS")) else 0
+        fill = np.nan if example.dtype.kind == "f" and not name.startswith("WEIGHTS") else 0
         blank = [np.full((count, *example.shape[1:]), fill, dtype=example.dtype) for count, _ in self._parts]
         return np.concatenate([part.get(name, rows) for (_, part), rows in zip(self._parts, blank, strict=True)])
 
@@ -116,21 +119,26 @@ class Encoded(NamedTuple):
 
 
 def encoded(name: str, values: Array, where: str = "points") -> Encoded | str:
-    """Return data (n,) or (n, k) at points or corners as an attribute of glTF, or why it cannot hold them."""
+    """Return data (n,) or (n, k) at points or corners as an attribute of glTF, or why it cannot hold them.
+
+    Texture coordinates may be NaN where they are missing.
+    """
     rows = values.reshape(len(values), -1)
     if rows.dtype.kind not in "biuf":
         return f"which are of type {rows.dtype}"
     if rows.shape[1] not in WIDTHS.values():
         return f"which have {rows.shape[1]} components"
-    if reason := share_not_finite(rows, where):
+    numbered = _SET.fullmatch(name)
+    is_uv = numbered is not None and numbered[1] == UV and rows.shape[1] == 2
+    given = rows[~np.isnan(rows).any(axis=1)] if is_uv else rows
+    if reason := share_not_finite(given if len(given) else rows, where):
         return reason
     if name == NORMAL and rows.shape[1] == 3 and not has_direction(rows).all():
         return "which have no length"
     width, kind = rows.shape[1], rows.dtype.str[1:]
-    numbered = _SET.fullmatch(name)
-    if numbered and numbered[1] == UV and width == 2:
+    if numbered and is_uv:
         flipped = np.column_stack([rows[:, 0], 1.0 - rows[:, 1].astype(np.float64)])
-        return Encoded(f"TEXCOORD_{int(numbered[2] or 0)}", flipped.astype(np.float32), False)
+        return Encoded(f"{TEXTURE_COORDINATES}_{int(numbered[2] or 0)}", flipped.astype(np.float32), False)
     if numbered and numbered[1] == COLOUR and width in (3, 4) and kind in ("u1", "u2", "f4", "f8"):
         is_real = kind.startswith("f")
         return Encoded(f"COLOR_{int(numbered[2] or 0)}", rows.astype(np.float32) if is_real else rows, not is_real)

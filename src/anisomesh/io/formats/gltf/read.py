@@ -10,12 +10,14 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
+from anisomesh.attributes.model import UNIT
 from anisomesh.io.carried import Carried, listed
 from anisomesh.io.cells import SurfaceCells, strip_triangles
 from anisomesh.io.formats.gltf.attributes import Attributes, read_attributes
 from anisomesh.io.formats.gltf.document import Document, index_of
 from anisomesh.io.formats.gltf.materials import read_materials
 from anisomesh.io.formats.region_names import also_named, divide, is_number
+from anisomesh.io.formats.units import OF_GLB
 from anisomesh.io.polygons import Integers, PolygonSoup
 
 NODE, MATERIAL = "node", "material"
@@ -105,6 +107,7 @@ class _Scene:
     def _carry(self) -> None:
         """Collect everything besides triangles."""
         carried = self._carried
+        carried.materials[UNIT] = OF_GLB
         with carried.optional("the attributes of points"):
             carried.point_data |= self._attributes.together(carried)
         nodes, materials = np.concatenate(self._nodes), np.concatenate(self._materials)

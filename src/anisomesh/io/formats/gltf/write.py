@@ -9,8 +9,8 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from anisomesh.attributes.model import Mesh, Regions
-from anisomesh.io.carried import Integers
-from anisomesh.io.formats.gltf.attributes import Encoded, encoded
+from anisomesh.io.carried import UV, Integers
+from anisomesh.io.formats.gltf.attributes import TEXTURE_COORDINATES, Encoded, encoded
 from anisomesh.io.formats.gltf.document import BINARY_CHUNK, COMPONENTS, JSON_CHUNK, WIDTHS
 from anisomesh.io.formats.gltf.materials import write_materials
 from anisomesh.io.formats.gltf.read import LEVELS, MATERIAL, NO_MATERIAL, NODE, TRIANGLES
@@ -95,11 +95,15 @@ def _add_mesh(mesh: Mesh, writer: _Writer, losses: Losses) -> list[int]:
     labels = [np.zeros(mesh.surface.n_faces, dtype=np.int64) if d is None else d.labels for d in (nodes, materials)]
     numbers = _material_numbers(materials, given_materials(mesh), writer, losses)
     primitives: dict[int, list[dict[str, Any]]] = {}
+    n_filled = 0
     for (node, material), chosen in by_label(*labels):
-        primitive = _primitive(mesh, np.sort(chosen), writer, attributes)
+        primitive, n_lacking = _primitive(mesh, np.sort(chosen), writer, attributes)
+        n_filled += n_lacking
         if material in numbers:
             primitive["material"] = numbers[material]
         primitives.setdefault(node, []).append(primitive)
+    if n_filled:
+        losses.say(f"that {n_filled:,} vertices have no {UV}: they get 0")
     texts = {} if nodes is None else region_texts(nodes, losses)
     return [writer.add_node(parts, texts.get(node, "")) for node, parts in primitives.items()]
 
@@ -141,15 +145,26 @@ def _material_numbers(
     return {label: writer.named_material(label, texts[label]) for label in labels}
 
 
-def _primitive(mesh: Mesh, chosen: Integers, writer: _Writer, attributes: list[_Attribute]) -> dict[str, Any]:
-    """Return a primitive of some faces."""
+def _primitive(
+    mesh: Mesh, chosen: Integers, writer: _Writer, attributes: list[_Attribute]
+) -> tuple[dict[str, Any], int]:
+    """Return a primitive of some faces, and how many of its texture coordinates are 0 since they are missing.
+
+    It has no texture coordinates where all are missing.
+    """
     vertices = _vertices(mesh, chosen)
-    numbers = {}
+    numbers, count = {}, 0
     for part in attributes:
         rows = part.data.rows[vertices.corners if part.at_corners else vertices.points]
+        if part.data.name.startswith(TEXTURE_COORDINATES):
+            lacking = np.isnan(rows).any(axis=1)
+            if lacking.all():
+                continue
+            rows[lacking] = (0.0, 1.0)  # the origin at the lower left
+            count += int(np.count_nonzero(lacking))
         numbers[part.data.name] = writer.add_rows(part.data._replace(rows=rows))
     corners = Encoded("", vertices.triangles.astype("<u4").reshape(-1, 1), False)
-    return {"attributes": numbers, "indices": writer.add_rows(corners, _ELEMENT_ARRAY), "mode": TRIANGLES}
+    return {"attributes": numbers, "indices": writer.add_rows(corners, _ELEMENT_ARRAY), "mode": TRIANGLES}, count
 
 
 def _vertices(mesh: Mesh, chosen: Integers) -> _Vertices:

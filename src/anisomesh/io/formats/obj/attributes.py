@@ -103,12 +103,9 @@ def take_corner_data(file: Lines, words: list[list[bytes]] | Integers, sizes: In
             if len(wrong):
                 raise ValueError(f"a face refers to {word.decode()} {chosen[wrong[0]]} of {len(table)}")
             rows = table[np.where(missing, 0, place)]
-            rows[missing] = np.nan if name == NORMAL else 0.0
+            rows[missing] = np.nan
             if missing.any():
-                filled = "NaN" if name == NORMAL else "0"
-                carried.remarks.append(
-                    f"{np.count_nonzero(missing)} corner(s) of faces have no {name} and get {filled}"
-                )
+                carried.remarks.append(f"{np.count_nonzero(missing)} corner(s) of faces have no {name} and get NaN")
             carried.corner_data[name] = rows
 
 

@@ -58,7 +58,7 @@ class Properties:
         if turned:
             rows = rows[:, [0, 3, 2, 1]]
         labels, colours = np.zeros(len(rows), dtype=np.int64), np.full((len(rows), 3, 4), 255, dtype=np.int64)
-        textures, coordinates = np.zeros(len(rows), dtype=np.int64), np.zeros((len(rows), 3, 2))
+        textures, coordinates = np.zeros(len(rows), dtype=np.int64), np.full((len(rows), 3, 2), np.nan)
         for group in np.unique(rows[:, 0]).tolist():
             chosen = np.flatnonzero(rows[:, 0] == group)
             if group in model.materials:
@@ -70,7 +70,7 @@ class Properties:
             elif group in model.texture_groups:
                 given = model.texture_groups[group]
                 textures[chosen] = self._texture_label(model.textures.get(given.texture, {}))
-                table = np.concatenate([np.zeros((1, 2)), given.coordinates])
+                table = np.concatenate([np.full((1, 2), np.nan), given.coordinates])
                 coordinates[chosen] = _members(table, rows[chosen, 1:])
         self._materials.append(labels)
         self._colours.append(colours)

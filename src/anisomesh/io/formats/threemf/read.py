@@ -15,11 +15,13 @@ from xml.parsers import expat
 import numpy as np
 import numpy.typing as npt
 
+from anisomesh.attributes.model import UNIT
 from anisomesh.io.carried import Carried, listed
 from anisomesh.io.cells import SurfaceCells
 from anisomesh.io.formats.region_names import also_named
 from anisomesh.io.formats.threemf.properties import MATERIAL, OBJECT, TEXTURES, Properties
 from anisomesh.io.formats.threemf.resources import CORE, NONE, Resources, number
+from anisomesh.io.formats.units import OF_3MF
 from anisomesh.io.polygons import Integers, PolygonSoup
 
 ROOT = "3D/3dmodel.model"
@@ -50,7 +52,7 @@ class _Model:
     items: list[tuple[tuple[str, str], str]] = field(default_factory=list)
     ignored: set[str] = field(default_factory=set)
     resources: Resources = field(default_factory=Resources)
-    unit: str = "millimeter"
+    unit: str = OF_3MF
 
 
 def read_3mf(data: bytes) -> PolygonSoup:
@@ -141,9 +143,7 @@ class _Build:
         for path, label in self._properties.carry(carried).items():
             with carried.optional(f"the image of the texture {path!r}"):
                 carried.materials[TEXTURES][label]["data"] = _entry(self._archive, path)
-        unit = self.model(self.root).unit
-        if unit != "millimeter":
-            carried.materials["unit"] = unit
+        carried.materials[UNIT] = self.model(self.root).unit
         others = sorted(self.ignored - _SHAPES)
         if others:
             carried.remarks.append(f"left out its {', '.join(others)}")

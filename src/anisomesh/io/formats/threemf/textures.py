@@ -71,14 +71,19 @@ def textured(mesh: Mesh, first: int, losses: Losses) -> Textured | None:
     tables = {
         label: table for label, table in given.items() if isinstance(table, Mapping) and image_kind(table.get("data"))
     }
+    has_uv = np.isfinite(uv).all(axis=(1, 2))
     texts = region_texts(division, losses, _as_part, distinct=True)
     attributes = np.full(mesh.surface.n_faces, "", dtype=object)
     resources, images, number = [], dict[str, tuple[str, bytes]](), first
     for label in texts:
-        chosen = np.flatnonzero(division.labels == label)
+        chosen = np.flatnonzero((division.labels == label) & has_uv)
         if label not in tables:
             if label != 0 or label in division.names:
                 losses.say(f"the texture {texts[label]!r}, whose image is missing")
+            continue
+        if (lacking := np.count_nonzero(division.labels == label) - len(chosen)) > 0:
+            losses.say(f"the texture {texts[label]!r} at {lacking} face(s), some corners of which have no {UV}")
+        if len(chosen) == 0:
             continue
         part, kind = f"{_FOLDER}/{texts[label]}", image_kind(tables[label]["data"])
         images[part] = kind, bytes(tables[label]["data"])
@@ -88,6 +93,9 @@ def textured(mesh: Mesh, first: int, losses: Losses) -> Textured | None:
         for face, (a, b, c) in corners:
             attributes[face] = f' pid="{number + 1}" p1="{a}" p2="{b}" p3="{c}"'
         number += 2
+    plain = np.count_nonzero((attributes == "") & has_uv & uv.any(axis=(1, 2)))
+    if images and plain:
+        losses.say(f"the {UV} of {plain} face(s) without a texture")
     return Textured("".join(resources), attributes, images, number) if images else None
 
 
@@ -95,7 +103,7 @@ def _coordinates(mesh: Mesh) -> Array | None:
     """Return texture coordinates at corners (F, 3, 2), None if there are none of this shape."""
     at_points = mesh.point_data.get(UV)
     uv = mesh.corner_data.get(UV, None if at_points is None else at_points[mesh.surface.faces])
-    if uv is None or uv.dtype.kind not in "fiu" or uv.shape[2:] != (2,) or not np.isfinite(uv).all():
+    if uv is None or uv.dtype.kind not in "fiu" or uv.shape[2:] != (2,) or not np.isfinite(uv).any():
         return None
     return uv.astype(np.float64)
 

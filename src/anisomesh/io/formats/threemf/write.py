@@ -9,13 +9,14 @@ from xml.sax.saxutils import quoteattr
 
 import numpy as np
 
-from anisomesh.attributes.model import Mesh, Regions
+from anisomesh.attributes.model import UNIT, Mesh, Regions
 from anisomesh.io.carried import COLOUR, UV, Array, Integers
 from anisomesh.io.formats.region_names import region_texts
 from anisomesh.io.formats.threemf.properties import MATERIAL, OBJECT, TEXTURE, TEXTURES
 from anisomesh.io.formats.threemf.read import MODEL_TYPE, ROOT
 from anisomesh.io.formats.threemf.resources import CORE, MATERIALS
 from anisomesh.io.formats.threemf.textures import Images, Textured, in_xml, textured
+from anisomesh.io.formats.units import OF_3MF
 from anisomesh.io.formats.words import format_rows
 from anisomesh.io.holding import Losses, by_label, main_division, share_not_finite
 
@@ -29,7 +30,7 @@ _UNITS = ("micron", "millimeter", "centimeter", "inch", "foot", "meter")
 
 
 def threemf_bytes(mesh: Mesh, losses: Losses) -> bytes:
-    """Return the content of a 3MF archive, in millimetres unless the input had another unit.
+    """Return the content of a 3MF archive, in millimetres unless the mesh has another unit.
 
     Notes
     -----
@@ -47,12 +48,12 @@ def threemf_bytes(mesh: Mesh, losses: Losses) -> bytes:
     first = _FIRST_FREE if textures is None else textures.next_number
     objects = _objects(mesh, None if found is None else found[1], properties, first, losses)
     items = "".join(f'<item objectid="{first + k}"/>' for k in range(len(objects)))
-    unit = mesh.materials.get("unit", "millimeter")
-    known = ("unit", "display_colours") if textures is None else ("unit", "display_colours", TEXTURES)
+    unit = mesh.materials.get(UNIT, OF_3MF)
+    known = (UNIT, "display_colours") if textures is None else (UNIT, "display_colours", TEXTURES)
     losses.add("materials", *(name for name in mesh.materials if name not in known))
     if unit not in _UNITS:
-        losses.say(f"the unit {unit!r}, for which the file has millimeter")
-        unit = "millimeter"
+        losses.say(f"the unit {unit!r}, for which the file has {OF_3MF}")
+        unit = OF_3MF
     model = (
         f'{_HEAD}<model unit="{unit}" xmlns="{CORE}" xmlns:m="{MATERIALS}">\n<resources>{resources}{"".join(objects)}'
         f"</resources><build>{items}</build></model>\n"
@@ -70,10 +71,10 @@ def _properties(mesh: Mesh, textures: Textured | None, losses: Losses) -> tuple[
     held = [*([] if rgba is None else [COLOUR]), *([] if textures is None else [UV])]
     for what, where, data in (("point data", "points", mesh.point_data), ("corner data", "corners", mesh.corner_data)):
         losses.add(what, *(name for name in data if name not in held))
-        for name in (name for name in (COLOUR, UV) if name in data and name not in held):
-            rows = data[name].reshape(-1, data[name].shape[-1])
+        if COLOUR in data and COLOUR not in held:
+            rows = data[COLOUR].reshape(-1, data[COLOUR].shape[-1])
             if rows.dtype.kind == "f" and (reason := share_not_finite(rows, where)):
-                losses.because(what, name, reason)
+                losses.because(what, COLOUR, reason)
     if materials is not None:
         group, attributes = _materials(mesh, materials, losses)
     elif rgba is not None:
@@ -107,6 +108,8 @@ def _materials(mesh: Mesh, materials: Regions, losses: Losses) -> tuple[str, Arr
     texts = region_texts(materials, losses, in_xml, distinct=True)
     labels = [label for label in texts if label != 0 or label in materials.names or len(texts) == 1]
     entries = []
+    if (n_unknown := sum(not displayed.get(label) for label in labels)) > 0:
+        losses.say(f"unknown colours of {n_unknown} of {len(labels)} material(s): they are grey")
     for label in labels:
         name = quoteattr(texts[label])
         entries.append(f'<base name={name} displaycolor="{displayed.get(label) or _GREY}"/>')
