@@ -52,8 +52,8 @@ def test_triangles_are_narrow_in_the_layer(run_cli, folder, source, field):
         (("-n", 99, "--adapt-to", "u", "--norm", "max"), "at least 1"),
         (("-n", 99, "--adapt-to", "u", "--metric", "uniform"), "--metric and --adapt-to say what the metric is"),
         (("-n", 99, "--norm", "inf"), "--adapt-to"),
-        (("--max-error", "1%", "--adapt-to", "u"), "-n or --ratio"),
-        (("--edge-length", "1", "--adapt-to", "u"), "-n or --ratio"),
+        (("--max-error", "1%", "--adapt-to", "u"), "give -n, --ratio or --ratios"),
+        (("--edge-length", "1", "--adapt-to", "u"), "give -n, --ratio or --ratios"),
     ],
 )
 def test_wrong_requests_are_explained(run_cli, folder, arguments, message):

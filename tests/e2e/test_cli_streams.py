@@ -31,7 +31,7 @@ def test_streams_hold_what_files_hold(tmp_path, suffix):
 
 
 def test_bad_formats_and_streams():
-    with pytest.raises(MeshFileError, match="stream: unknown format"):
+    with pytest.raises(MeshFileError, match="stream: has no name that ends in a format; give file_format"):
         load(io.BytesIO(b"x"))
     with pytest.raises(MeshFileError, match="unknown format 'docx'; expected one of"):
         save(TORUS, io.BytesIO(), file_format="docx")

@@ -7,7 +7,7 @@ torch = pytest.importorskip("torch")
 
 from anisomesh.denoise.noise import NOISES, with_noise  # noqa: E402
 from anisomesh.learn.architecture import NetworkOptions  # noqa: E402
-from anisomesh.learn.data.examples import stretch_example  # noqa: E402
+from anisomesh.learn.data.examples import OffsetTarget, stretch_example  # noqa: E402
 from anisomesh.learn.data.items import Item  # noqa: E402
 from anisomesh.learn.graphs.graph import graph_from_edges  # noqa: E402
 from anisomesh.learn.graphs.hierarchy import N_EDGE_FEATURES, N_NODE_FEATURES, graph_hierarchy  # noqa: E402
@@ -195,7 +195,7 @@ def test_noise_moves_the_mesh_and_not_the_lines_wanted():
     assert np.abs(clean.hierarchy.levels[0].nodes - noisy.hierarchy.levels[0].nodes).max() > 0.1
     length = [torch.linalg.norm(example.line_field, dim=1) for example in (clean, noisy)]
     torch.testing.assert_close(*length, atol=1e-4, rtol=1e-4)
-    assert float(clean.weight.sum()) == pytest.approx(1.0)
+    assert float(clean.offsets.weight.sum()) == pytest.approx(1.0)
     tensors = [tensors_of_line_field(each.line_field.numpy(), each.hierarchy.frames) for each in (clean, noisy)]
     cosine = np.einsum("nx,nx->n", *(principal_stretch(t)[0] for t in tensors))
     stretched = length[0].numpy() > 0.3
@@ -208,15 +208,15 @@ def test_noise_moves_the_mesh_and_not_the_lines_wanted():
 def test_the_offsets_wanted_take_the_noise_away(kind):
     item = egg_item()
     rng, again = np.random.default_rng(0), np.random.default_rng(0)
-    example = stretch_example(item, 3, 0.3, rng, kind)
+    target = stretch_example(item, 3, 0.3, rng, kind).offsets
     noisy = with_noise(item.surface, 0.3, again, kind)
     away = np.linalg.norm(noisy.points - item.surface.points, axis=1)
     deviation = {"independent": 0.3 * np.sqrt(3.0), "normal": 0.3, "smooth": 0.15 * np.sqrt(3.0)}[kind]
-    assert np.sqrt((away**2).mean()) == pytest.approx(deviation * example.unit, rel=0.15)
-    np.testing.assert_allclose(noisy.points + example.unit * example.offsets.numpy(), item.points, atol=1e-6)
+    assert np.sqrt((away**2).mean()) == pytest.approx(deviation * target.unit, rel=0.15)
+    np.testing.assert_allclose(noisy.points + target.unit * target.offsets.numpy(), item.points, atol=1e-6)
     height = np.einsum("nx,nx->n", noisy.points - item.surface.points, item.surface.point_normals)
-    seen = torch.einsum("vi,vij,vj->v", example.offsets, example.quadrics, example.offsets).sqrt().numpy()
-    np.testing.assert_allclose(seen * example.unit, np.abs(height), atol=0.15 * away.max())
+    seen = torch.einsum("vi,vij,vj->v", target.offsets, target.quadrics, target.offsets).sqrt().numpy()
+    np.testing.assert_allclose(seen * target.unit, np.abs(height), atol=0.15 * away.max())
 
 
 def test_the_loss_of_offsets_is_zero_for_the_answer_and_for_motion_along_a_plane():
@@ -224,13 +224,14 @@ def test_the_loss_of_offsets_is_zero_for_the_answer_and_for_motion_along_a_plane
     wanted = torch.from_numpy(rng.normal(size=(4, 3)).astype(np.float32))
     up = torch.diag(torch.tensor([0.0, 0.0, 1.0])).expand(4, 3, 3)
     edges, weight = torch.tensor([[0, 1], [1, 2], [2, 3]]), torch.full((4,), 0.25)
+    target = OffsetTarget(offsets=wanted, quadrics=up, edges=edges, weight=weight, unit=1.0)
     along = wanted + torch.tensor([3.0, -2.0, 0.0])
     for offsets in (wanted, along):
-        assert float(offset_loss(offsets, wanted, up, edges, weight)) == pytest.approx(0.0, abs=1e-6)
+        assert float(offset_loss(offsets, target)) == pytest.approx(0.0, abs=1e-6)
     raised = wanted + torch.tensor([0.0, 0.0, 1.0])
-    assert float(offset_loss(raised, wanted, up, edges, weight)) == pytest.approx(1.0, abs=0.03)
+    assert float(offset_loss(raised, target)) == pytest.approx(1.0, abs=0.03)
     rough = wanted + torch.tensor([[0.0, 0.0, 1.0], [0.0, 0.0, -1.0]] * 2)
-    assert float(offset_loss(rough, wanted, up, edges, weight)) == pytest.approx(3.0, abs=0.05)
+    assert float(offset_loss(rough, target)) == pytest.approx(3.0, abs=0.05)
 
 
 @pytest.mark.slow

@@ -6,7 +6,6 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from anisomesh.attributes.model import UNIT
 from anisomesh.cli.report import counted
 
 if TYPE_CHECKING:
@@ -20,6 +19,8 @@ _DATA_TITLES = {"point_data": "point data", "face_data": "face data", "corner_da
 
 def contents(mesh: Mesh) -> dict[str, Any]:
     """Return what a mesh carries, for JSON: lengths in model units, areas in their square."""
+    from anisomesh.attributes.model import UNIT
+
     ends = mesh.surface.points[mesh.features]
     unit = mesh.materials.get(UNIT)
     return {
