@@ -138,8 +138,7 @@ def even_mesh(surface: Surface, recipe: Recipe, remesher: Remesher) -> Surface:
     Raises
     ------
     UnsuitableError
-        If there is no such mesh without inverted triangles, or, for a working surface, its triangles are bad or
-        too many.
+        If every such mesh has inverted triangles, or the working surface has bad or too many triangles.
     """
     if recipe.evening == "working":
         working = _working_mesh(surface, recipe.target)

@@ -77,7 +77,7 @@ class Task(Protocol):
         ...
 
     def baseline_losses(self, example: Any) -> Losses:
-        """Return the losses that those of the network are compared with: of no stretch and no noise, or a filter's."""
+        """Return the losses of a baseline: of predicting no stretch and no noise, or of the bilateral filter."""
         ...
 
 

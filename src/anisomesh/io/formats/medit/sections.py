@@ -85,7 +85,7 @@ _LONG_POSITIONS, _LONG_INTEGERS = 3, 4  # first versions whose positions, and wh
 
 
 class Numbers(NamedTuple):
-    """Rows of real numbers (n, k) and of integers (n, m); these are float64 if some are no integers of 64 bits."""
+    """Rows of real numbers (n, k) and of integers (n, m), which are float64 if some do not fit 64 bits."""
 
     reals: npt.NDArray[np.float64]
     integers: npt.NDArray[Any]
