@@ -14,7 +14,6 @@ from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
     from anisomesh.attributes.model import Mesh, Regions
-    from anisomesh.attributes.transfer import transfer_attributes
     from anisomesh.conformance import ConformanceError, check_embedder, check_energy_gradient, check_metric_source
     from anisomesh.cvt.energy import NormalMetric
     from anisomesh.cvt.polygon_energy import energy_from_kernel
@@ -28,6 +27,7 @@ if TYPE_CHECKING:
     from anisomesh.execution.progress import StepInfo
     from anisomesh.features.network import trace_features
     from anisomesh.io.meshes import load, load_mesh, save
+    from anisomesh.io.transfer import transfer_attributes
     from anisomesh.learn.inference.source import Hybrid, Neural
     from anisomesh.levels.model import Levels
     from anisomesh.levels.remesh import remesh_levels
@@ -56,7 +56,7 @@ _MODULE_OF = {
     "Surface": "mesh.surface",
     "Mesh": "attributes.model",
     "Regions": "attributes.model",
-    "transfer_attributes": "attributes.transfer",
+    "transfer_attributes": "io.transfer",
     "load": "io.meshes",
     "load_mesh": "io.meshes",
     "save": "io.meshes",

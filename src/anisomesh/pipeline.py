@@ -12,7 +12,7 @@ from typing import Any
 import numpy.typing as npt
 
 from anisomesh.attributes.model import Mesh
-from anisomesh.attributes.transfer import oriented_as, transfer_attributes
+from anisomesh.attributes.transfer import oriented_as, transferred
 from anisomesh.caveats import (
     caveats,
     lengths_beyond,
@@ -183,7 +183,7 @@ def with_attributes(result: RemeshResult, given: Mesh, cut: Cut, options: Remesh
 
     with run.stage("attributes"):
         source = oriented(with_split_sides(given, result.prepare_report, options))
-        mesh = transfer_attributes(source, result.surface)
+        mesh = transferred(source, result.surface)
         if cut.locked.any():
             mesh = cut.with_exact_attributes(mesh, oriented(given))
     warnings = (*result.warnings, *losses_of_attributes(given, mesh))

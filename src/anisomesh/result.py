@@ -35,7 +35,7 @@ class RemeshResult:
     surface
         The result, in model units.
     mesh
-        The same with everything that the input carries, see :func:`~anisomesh.attributes.transfer.transfer_attributes`.
+        The same with everything that the input carries, see :func:`~anisomesh.io.transfer.transfer_attributes`.
     prepared
         The input after repair, in model units.
     prepare_report

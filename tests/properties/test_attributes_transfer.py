@@ -6,8 +6,9 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
-from anisomesh import Mesh, MeshError, Regions, Surface, transfer_attributes
+from anisomesh import Mesh, MeshError, MeshFileError, Regions, Surface, save, transfer_attributes
 from anisomesh.attributes.blend import Blend, blend_skin
+from anisomesh.io.objects.write import to_meshio, to_pyvista
 from anisomesh.shapes.analytic import box, sphere
 
 RNG = np.random.default_rng(5)
@@ -351,11 +352,22 @@ def test_charts_of_single_faces_stay_within_them():
     assert (np.einsum("fx,fx->f", result[:, 0], target.face_normals) > 0.98).all()
 
 
+def test_sources_and_targets_can_be_files_and_objects_of_libraries(tmp_path):
+    trimesh = pytest.importorskip("trimesh")
+    source, target = Mesh(surface=sphere(2), point_data={"height": sphere(2).points[:, 2]}), turned(sphere(2))
+    save(source, tmp_path / "source.ply")
+    expected = transfer_attributes(source, target)
+    for given in (tmp_path / "source.ply", to_meshio(source), to_pyvista(source)):
+        result = transfer_attributes(given, trimesh.Trimesh(target.points, target.faces, process=False))
+        np.testing.assert_array_equal(result.surface.faces, target.faces)
+        np.testing.assert_allclose(result.point_data["height"], expected.point_data["height"], atol=1e-12)
+
+
 def test_other_types_are_an_error():
-    with pytest.raises(MeshError, match="expected a Mesh and a Surface, not Surface and Surface"):
-        transfer_attributes(sphere(1), sphere(1))
-    with pytest.raises(MeshError, match="as_surface makes a Surface of other objects"):
+    with pytest.raises(MeshError, match="cannot read a mesh from ndarray"):
         transfer_attributes(Mesh(surface=sphere(1)), sphere(1).points)
+    with pytest.raises(MeshFileError, match="no such file; expected a mesh file"):
+        transfer_attributes("nofile.ply", sphere(1))
 
 
 def test_a_mesh_is_a_target_by_its_surface():

@@ -12,55 +12,15 @@ from anisomesh.attributes.lines import same_faces, transfer_fixed_points, transf
 from anisomesh.attributes.located import Located, majority
 from anisomesh.attributes.model import Array, Ints, Mesh, Regions
 from anisomesh.attributes.places import Floats
-from anisomesh.errors import MeshError
 from anisomesh.mesh.closest_points import ClosestPoints
 from anisomesh.mesh.surface import Surface
 
 
-def transfer_attributes(source: Mesh, target: Surface | Mesh) -> Mesh:
+def transferred(source: Mesh, target: Surface) -> Mesh:
     """Return a surface with everything that a mesh of about the same surface carries.
 
-    Parameters
-    ----------
-    source
-        The mesh. It need be neither manifold nor oriented; where it is thin, the sheet that faces the way of the target
-        is taken.
-    target
-        A surface near the one of the mesh, in the same units, or a mesh with this surface, whose own attributes are not
-        looked at. If it is the same surface, everything is returned unchanged.
-
-    Returns
-    -------
-    Mesh
-        The target. Point data with different values at coincident points, as on seams of texture coordinates in files
-        that have no corner data, are corner data of it.
-
-    Raises
-    ------
-    MeshError
-        If the arguments are of other types.
-
-    Notes
-    -----
-    - *Regions.* A face is in the part of the source that most of it is on, judged at seven places inside it with the
-      weights of a quadrature.
-    - *Point data* are evaluated at the closest point, on the parts of the faces around the target point: real numbers
-      and colours between the corners of the triangle there, bools, integers and strings at its nearest corner.
-    - *Face data.* Real numbers come from the source face closest to the centroid; of others the most frequent ones at
-      the seven places are taken.
-    - *Corner data* are continuous on charts. A face is on the chart that most of the seven places are on, and the
-      places of its corners are reached by straight walks from one of these within the chart: no value beyond a seam
-      has a part in it.
-    - *Features* are the edges of the target along the ones of the source, *fixed points* the points of the target at
-      the ones of the source; they are in the regions of the closest of these. *Fixed faces* are the faces of the target
-      with the same corners.
+    Parameters and result are the ones of :func:`~anisomesh.io.transfer.transfer_attributes`.
     """
-    target = target.surface if isinstance(target, Mesh) else target
-    if not isinstance(source, Mesh) or not isinstance(target, Surface):
-        raise MeshError(
-            f"expected a Mesh and a Surface, not {type(source).__name__} and {type(target).__name__}; load_mesh reads "
-            "a Mesh from a file, and as_surface makes a Surface of other objects"
-        )
     own = source.surface
     if np.array_equal(own.points, target.points) and np.array_equal(own.faces, target.faces):
         return replace(source, surface=target)
