@@ -10,7 +10,7 @@ import pytest
 from anisomesh.attributes.model import Mesh
 from anisomesh.io.formats.gmsh.read import read_msh
 from anisomesh.io.formats.gmsh.write import msh_bytes
-from anisomesh.io.holding import Losses
+from anisomesh.io.holding.losses import Losses
 from anisomesh.io.meshes import load_mesh
 from anisomesh.shapes.analytic import box
 

@@ -23,7 +23,7 @@ from anisomesh.io.formats.threemf.read import read_3mf
 from anisomesh.io.formats.threemf.write import threemf_bytes
 from anisomesh.io.formats.vtk.read import read_vtp, read_vtu
 from anisomesh.io.formats.vtk.write import vtp_mesh_bytes, vtu_mesh_bytes
-from anisomesh.io.holding import Losses
+from anisomesh.io.holding.losses import Losses
 from anisomesh.io.polygons import PolygonSoup
 
 READERS: dict[str, Callable[[bytes], PolygonSoup]] = {

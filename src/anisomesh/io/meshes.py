@@ -18,7 +18,7 @@ from anisomesh.io.assemble import as_mesh
 from anisomesh.io.atomic import atomic_path
 from anisomesh.io.convert import from_object
 from anisomesh.io.formats.words import BYTE_ORDER_MARK
-from anisomesh.io.holding import Losses
+from anisomesh.io.holding.losses import Losses
 from anisomesh.io.known_formats import READERS, TEXT_FORMATS, known_suffix
 from anisomesh.io.materials import files as material_files
 from anisomesh.io.materials.content import file_content, warn_of_losses

@@ -10,7 +10,7 @@ from anisomesh.attributes.model import Mesh
 from anisomesh.errors import MeshFileError
 from anisomesh.io.atomic import atomic_paths
 from anisomesh.io.formats.gltf.write import glb_levels_bytes
-from anisomesh.io.holding import Losses
+from anisomesh.io.holding.losses import Losses
 from anisomesh.io.known_formats import known_suffix
 from anisomesh.io.materials.content import file_content, levels_for_glb, warn_of_losses
 

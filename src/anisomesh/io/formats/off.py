@@ -10,7 +10,9 @@ import numpy as np
 from anisomesh.attributes.model import Mesh
 from anisomesh.io.carried import COLOUR, NORMAL, UV, Array, Carried
 from anisomesh.io.formats.words import coordinates, integers
-from anisomesh.io.holding import Losses, continuous_corner_data, has_direction, with_all_normals
+from anisomesh.io.holding.corners import continuous_corner_data
+from anisomesh.io.holding.losses import Losses
+from anisomesh.io.holding.normals import has_direction, with_all_normals
 from anisomesh.io.polygons import PolygonSoup
 
 _BYTE = 255

@@ -10,7 +10,7 @@ import numpy as np
 
 from anisomesh.attributes.model import Regions
 from anisomesh.io.carried import Carried, Division, Integers
-from anisomesh.io.holding import EMPTY_REGIONS, Losses
+from anisomesh.io.holding.losses import EMPTY_REGIONS, Losses
 
 _NUMBERED = "region_"  # in front of the number of a region without a name
 _DIGITS = re.compile(r"-?\d{1,19}")  # of labels, which have 64 bits

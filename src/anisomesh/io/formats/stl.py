@@ -12,7 +12,8 @@ from anisomesh.attributes.model import Mesh, Regions
 from anisomesh.io.carried import Carried
 from anisomesh.io.formats.region_names import divide, in_words, region_texts
 from anisomesh.io.formats.words import BYTE_ORDER_MARK, format_rows
-from anisomesh.io.holding import Losses, by_label, main_division
+from anisomesh.io.holding.divisions import by_label, main_division
+from anisomesh.io.holding.losses import Losses
 from anisomesh.io.polygons import PolygonSoup
 from anisomesh.mesh.geometry import face_cross, unit
 from anisomesh.mesh.weld import coincident

@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import replace
 
 from anisomesh.attributes.model import UNIT, Mesh
-from anisomesh.io.holding import Losses
+from anisomesh.io.holding.losses import Losses
 
 OF_3MF, OF_GLB = "millimeter", "meter"
 """The unit of 3MF files that name none, and of all GLB files, by specification."""

@@ -9,7 +9,8 @@ from pathlib import Path
 from anisomesh.attributes.model import Mesh
 from anisomesh.errors import MeshFileError
 from anisomesh.io.formats.units import in_unit_of
-from anisomesh.io.holding import Losses, without_unnamed
+from anisomesh.io.holding.losses import Losses
+from anisomesh.io.holding.values import without_unnamed
 from anisomesh.io.known_formats import WRITERS
 from anisomesh.io.materials import files as material_files
 from anisomesh.io.materials import from_gltf

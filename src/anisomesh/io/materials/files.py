@@ -12,7 +12,7 @@ from urllib.parse import quote, unquote
 from anisomesh.attributes.model import Mesh
 from anisomesh.io.atomic import atomic_path
 from anisomesh.io.formats.obj.attributes import LIBRARIES
-from anisomesh.io.holding import Losses
+from anisomesh.io.holding.losses import Losses
 from anisomesh.io.materials import textures
 from anisomesh.io.materials.textures import absolute_name, is_file, is_in_text
 

@@ -16,7 +16,7 @@ from anisomesh.io.formats.obj.attributes import LIBRARIES
 from anisomesh.io.formats.region_names import in_words, region_texts
 from anisomesh.io.formats.threemf.properties import TEXTURE, TEXTURES
 from anisomesh.io.formats.threemf.textures import image_kind
-from anisomesh.io.holding import Losses
+from anisomesh.io.holding.losses import Losses
 from anisomesh.io.materials.textures import texture_line
 
 DISPLAYED = "display_colours"

@@ -20,7 +20,7 @@ from anisomesh.io.formats.obj.attributes import LIBRARIES
 from anisomesh.io.formats.region_names import in_words, is_number
 from anisomesh.io.formats.threemf.properties import TEXTURE, TEXTURES
 from anisomesh.io.formats.threemf.textures import image_kind
-from anisomesh.io.holding import EMPTY_REGIONS, Losses
+from anisomesh.io.holding.losses import EMPTY_REGIONS, Losses
 from anisomesh.io.materials.files import is_file_name, write_library
 from anisomesh.io.materials.for_gltf import DISPLAYED, FILTERS, WRAPS, with_gltf_materials
 from anisomesh.io.objects.trimesh_scenes import TRIMESH

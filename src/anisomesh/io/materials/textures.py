@@ -9,7 +9,7 @@ from pathlib import Path, PureWindowsPath
 from typing import NamedTuple
 
 from anisomesh.io.carried import listed
-from anisomesh.io.holding import Losses
+from anisomesh.io.holding.losses import Losses
 
 _TEXTURE = re.compile(r"\s*(?:map_\w+|bump|disp|decal|refl|norm)\s", re.IGNORECASE)
 _OPTION = re.compile(r"-[a-zA-Z]+")

@@ -19,14 +19,9 @@ from anisomesh.io.formats.region_names import region_texts
 from anisomesh.io.formats.units import in_unit_of
 from anisomesh.io.formats.vtk.data import ORIGINAL_POINT, blank_rows
 from anisomesh.io.formats.vtk.write import active_names, vtk_polygons
-from anisomesh.io.holding import (
-    OF_FEATURES,
-    OF_FIXED_POINTS,
-    Losses,
-    by_label,
-    continuous_corner_data,
-    with_points_repeated,
-)
+from anisomesh.io.holding.corners import continuous_corner_data, with_points_repeated
+from anisomesh.io.holding.divisions import by_label
+from anisomesh.io.holding.losses import OF_FEATURES, OF_FIXED_POINTS, Losses
 from anisomesh.io.materials.from_gltf import without_mere_names
 from anisomesh.io.objects.read import CELL_SET, MESHIO_DIVISIONS
 from anisomesh.io.objects.trimesh_scenes import TRIMESH

@@ -10,7 +10,8 @@ import numpy.typing as npt
 
 from anisomesh.io.carried import COLOUR, NORMAL, UV, Array, Carried
 from anisomesh.io.formats.gltf.document import COMPONENTS, WIDTHS, Document, as_numbers
-from anisomesh.io.holding import has_direction, share_not_finite
+from anisomesh.io.holding.normals import has_direction
+from anisomesh.io.holding.values import share_not_finite
 from anisomesh.mesh.geometry import unit
 
 TANGENT = "tangent"

@@ -15,7 +15,10 @@ from anisomesh.io.formats.gltf.document import BINARY_CHUNK, COMPONENTS, JSON_CH
 from anisomesh.io.formats.gltf.materials import write_materials
 from anisomesh.io.formats.gltf.read import LEVELS, MATERIAL, NO_MATERIAL, NODE, TRIANGLES
 from anisomesh.io.formats.region_names import region_texts
-from anisomesh.io.holding import Losses, by_label, distinct_corners, main_division, with_all_normals
+from anisomesh.io.holding.corners import distinct_corners
+from anisomesh.io.holding.divisions import by_label, main_division
+from anisomesh.io.holding.losses import Losses
+from anisomesh.io.holding.normals import with_all_normals
 from anisomesh.io.objects.trimesh_scenes import TRIMESH, materials_as_gltf
 
 _COVERAGE = "MSFT_screencoverage"  # least share of the screen for each level

@@ -14,20 +14,10 @@ from anisomesh.io.carried import Array, Integers, separate_columns
 from anisomesh.io.formats.gmsh.data import COMMENT, UNLABELLED
 from anisomesh.io.formats.gmsh.elements import GEOMETRICAL, LINE, PHYSICAL, POINT, TRIANGLE, entities_of
 from anisomesh.io.formats.region_names import empty_regions, in_a_line, region_texts
-from anisomesh.io.holding import (
-    EMPTY_REGIONS,
-    OF_FEATURES,
-    OF_FIXED_POINTS,
-    TOO_LARGE,
-    Losses,
-    continuous_corner_data,
-    fits_int32,
-    flat_rows,
-    held_division,
-    is_exact_in_float64,
-    main_division,
-    numeric,
-)
+from anisomesh.io.holding.corners import continuous_corner_data
+from anisomesh.io.holding.divisions import fits_int32, held_division, main_division
+from anisomesh.io.holding.losses import EMPTY_REGIONS, OF_FEATURES, OF_FIXED_POINTS, TOO_LARGE, Losses
+from anisomesh.io.holding.values import flat_rows, is_exact_in_float64, numeric
 
 _TOO_LARGE_TAGS = "whose integers are too large for tags, which have 32 bits"
 _WIDTHS = (1, 3, 9)  # numbers of components that Gmsh knows

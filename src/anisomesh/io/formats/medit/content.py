@@ -10,7 +10,7 @@ import numpy.typing as npt
 
 from anisomesh.io.carried import Array, Integers
 from anisomesh.io.formats.medit.sections import END, KEYWORDS, SPACE
-from anisomesh.io.holding import fits_int32
+from anisomesh.io.holding.divisions import fits_int32
 
 _SHORT, _LONG_POSITIONS, _LONG_INTEGERS = 2, 3, 4  # versions: in the first, integers and positions have 32 bits
 _MOST_SHORT = 2**31 - 1  # bytes of a file whose positions have 32 bits

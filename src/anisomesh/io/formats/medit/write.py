@@ -8,15 +8,10 @@ from anisomesh.attributes.model import Mesh
 from anisomesh.io.carried import NORMAL, Array
 from anisomesh.io.formats.medit.content import Rows, binary_content, of_integers, of_reals, text_content
 from anisomesh.io.formats.medit.read import REFERENCE
-from anisomesh.io.holding import (
-    OF_FEATURES,
-    OF_FIXED_POINTS,
-    Losses,
-    continuous_corner_data,
-    has_direction,
-    held_division,
-    main_division,
-)
+from anisomesh.io.holding.corners import continuous_corner_data
+from anisomesh.io.holding.divisions import held_division, main_division
+from anisomesh.io.holding.losses import OF_FEATURES, OF_FIXED_POINTS, Losses
+from anisomesh.io.holding.normals import has_direction
 
 
 def medit_bytes(mesh: Mesh, losses: Losses) -> bytes:

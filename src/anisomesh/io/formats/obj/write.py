@@ -13,7 +13,9 @@ from anisomesh.io.carried import COLOUR, NORMAL, UV, Array, Integers
 from anisomesh.io.formats.obj.attributes import DIVISIONS, OF_LINES, SMOOTHING
 from anisomesh.io.formats.region_names import in_words, region_texts
 from anisomesh.io.formats.words import format_rows
-from anisomesh.io.holding import OF_FEATURES, OF_FIXED_POINTS, Losses, has_direction, main_division
+from anisomesh.io.holding.divisions import main_division
+from anisomesh.io.holding.losses import OF_FEATURES, OF_FIXED_POINTS, Losses
+from anisomesh.io.holding.normals import has_direction
 
 States = list[tuple[str, Integers, dict[int, str]]]
 """What changes between elements: the word, the label of each element (n,), and the text for each label."""

@@ -10,18 +10,9 @@ from anisomesh.attributes.model import Mesh, Regions
 from anisomesh.io.carried import COLOUR, NORMAL, UV, Array, separate_columns
 from anisomesh.io.formats.ply.header import EDGE_REGIONS, NAME, PLY_TYPES, REGIONS, TEXTURE_FILE
 from anisomesh.io.formats.region_names import quoted
-from anisomesh.io.holding import (
-    OF_FEATURES,
-    OF_FIXED_POINTS,
-    TOO_LARGE,
-    Losses,
-    flat_rows,
-    is_exact_in_float64,
-    narrowed,
-    numeric,
-    regions_as_integers,
-    without_unnamed,
-)
+from anisomesh.io.holding.divisions import narrowed, regions_as_integers
+from anisomesh.io.holding.losses import OF_FEATURES, OF_FIXED_POINTS, TOO_LARGE, Losses
+from anisomesh.io.holding.values import flat_rows, is_exact_in_float64, numeric, without_unnamed
 
 _COLUMNS = {  # names of the columns of arrays, by name and width
     (COLOUR, 3): ("red", "green", "blue"),

@@ -15,7 +15,7 @@ from anisomesh.io.formats.region_names import region_texts
 from anisomesh.io.formats.threemf.properties import TEXTURE, TEXTURES
 from anisomesh.io.formats.threemf.resources import TEXTURE_ATTRIBUTES
 from anisomesh.io.formats.words import format_rows
-from anisomesh.io.holding import Losses
+from anisomesh.io.holding.losses import Losses
 
 _FOLDER = "3D/Textures"
 _NOT_IN_XML = re.compile("[^\t\n\r\x20-\ud7ff\ue000-\ufffd\U00010000-\U0010ffff]")

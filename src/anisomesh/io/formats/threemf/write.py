@@ -18,7 +18,9 @@ from anisomesh.io.formats.threemf.resources import CORE, MATERIALS
 from anisomesh.io.formats.threemf.textures import Images, Textured, in_xml, textured
 from anisomesh.io.formats.units import OF_3MF
 from anisomesh.io.formats.words import format_rows
-from anisomesh.io.holding import Losses, by_label, main_division, share_not_finite
+from anisomesh.io.holding.divisions import by_label, main_division
+from anisomesh.io.holding.losses import Losses
+from anisomesh.io.holding.values import share_not_finite
 
 _DATE = (1980, 1, 1, 0, 0, 0)  # of all entries, so that the same mesh gives the same file
 _GREY = "#808080FF"

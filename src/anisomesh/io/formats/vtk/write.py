@@ -23,17 +23,10 @@ from anisomesh.io.formats.vtk.data import (
     ORIGINAL_POINT,
     blank_rows,
 )
-from anisomesh.io.holding import (
-    OF_FEATURES,
-    OF_FIXED_POINTS,
-    Losses,
-    continuous_corner_data,
-    flat_rows,
-    narrowed,
-    numeric,
-    with_points_repeated,
-    without_unnamed,
-)
+from anisomesh.io.holding.corners import continuous_corner_data, with_points_repeated
+from anisomesh.io.holding.divisions import narrowed
+from anisomesh.io.holding.losses import OF_FEATURES, OF_FIXED_POINTS, Losses
+from anisomesh.io.holding.values import flat_rows, numeric, without_unnamed
 from anisomesh.io.polygons import Integers
 
 Data = Mapping[str, npt.NDArray[Any]]

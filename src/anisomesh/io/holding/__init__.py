@@ -1,0 +1,1 @@
+"""What formats can hold of a mesh."""
