@@ -107,14 +107,16 @@ def _features(carried: Carried, surface: Surface) -> tuple[Integers, dict[str, R
     """Return the lines that are edges of the surface (n, 2), without repetition, in order, and divisions of them."""
     (straight, halves), (row, row_of_half) = _in_range(carried.lines.blocks, surface.n_points)
     both = np.concatenate([straight, halves])
-    if len(both) == 0:
-        return both, {}
     n_lines = len(straight)
     keys = edge_keys(np.sort(both, axis=1))
-    are_edges = np.isin(keys, edge_keys(surface.edges))
-    missing = n_lines - np.count_nonzero(are_edges[:n_lines])
-    if missing and len(halves) == 0:
+    are_edges = np.isin(keys, edge_keys(surface.edges) if len(keys) else keys)
+    missing = sum(map(len, carried.lines.blocks)) - n_lines  # not within the points
+    if len(halves) == 0:
+        missing += n_lines - int(np.count_nonzero(are_edges))
+    if missing:
         carried.remarks.append(f"left out {missing} line(s) that are not edges of its surface")
+    if len(both) == 0:
+        return both, {}
     rows = np.concatenate([row, row_of_half])
     chosen, divisions = _each_once(carried, carried.lines, keys, rows, np.flatnonzero(are_edges))
     features: Integers = both[chosen]

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import codecs
+import re
 from collections.abc import Callable
 from pathlib import Path
 
@@ -52,9 +54,35 @@ WRITERS: dict[str, Callable[[Mesh, Losses], bytes]] = {
     ".mesh": medit_bytes,
     ".meshb": meditb_bytes,
 }
-TEXT_FORMATS = (".obj", ".off", ".ply", ".msh", ".mesh")  # may begin with a byte order mark
+TEXT_FORMATS = (".obj", ".off", ".ply", ".msh", ".mesh")
+"""Extensions of formats of text, which may begin with a byte order mark."""
+
 MESH_FORMATS = tuple(READERS)
 """Extensions of files that are read and written, in lower case with the dot."""
+
+
+_BEGINNINGS = (  # what a file begins with, the extensions that it may have, and what it is called in messages
+    (rb"ply\s", (".ply",), "a PLY file"),
+    (rb"\s*\$(MeshFormat|Comments)\b", (".msh",), "a Gmsh file (MSH)"),
+    (rb"glTF", (".glb",), "a GLB file"),
+    (rb"PK\x03\x04", (".3mf",), "a 3MF file or another archive"),
+    (rb"\s*MeshVersionFormatted", (".mesh", ".meshb"), "a MEDIT file"),
+    (rb"\s*(ST)?C?N?OFF\s", (".off",), "an OFF file"),
+    (rb"\s*solid\b.*\n\s*facet\s", (".stl",), "a text STL file"),
+    (rb"\s*(<\?xml[^>]*>\s*)?<VTKFile", (".vtu", ".vtp"), "a VTK file (VTU or VTP)"),
+    (rb"# vtk DataFile", (), "a legacy VTK file (.vtk); save it as VTU or VTP"),
+    (rb"\s*<(!DOCTYPE )?html\b", (), "a web page"),
+)
+
+
+def mistaken_format(data: bytes, suffix: str) -> str:
+    """Return what a file that cannot be read in a format seems to be instead, empty if that is not known."""
+    if suffix in TEXT_FORMATS and data.startswith((codecs.BOM_UTF16_LE, codecs.BOM_UTF16_BE)):
+        return "text in UTF-16; save it in UTF-8"
+    for beginning, suffixes, name in _BEGINNINGS:
+        if suffix not in suffixes and re.match(beginning, data.removeprefix(codecs.BOM_UTF8), re.IGNORECASE):
+            return f"{name}; give it the extension {suffixes[0]}" if suffixes else name
+    return ""
 
 
 def known_suffix(path: str | Path, file_format: str | None, *, is_stream: bool = False) -> str:

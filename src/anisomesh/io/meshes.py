@@ -19,7 +19,7 @@ from anisomesh.io.atomic import atomic_path
 from anisomesh.io.convert import from_object
 from anisomesh.io.formats.words import BYTE_ORDER_MARK
 from anisomesh.io.holding.losses import Losses
-from anisomesh.io.known_formats import READERS, TEXT_FORMATS, known_suffix
+from anisomesh.io.known_formats import READERS, TEXT_FORMATS, known_suffix, mistaken_format
 from anisomesh.io.materials import files as material_files
 from anisomesh.io.materials.content import file_content, warn_of_losses
 from anisomesh.mesh.surface import Surface
@@ -112,7 +112,8 @@ def _read(path: str | os.PathLike[str] | BinaryIO, file_format: str | None) -> t
         reason = str(error)
         if type(error) is not ValueError:
             reason = f"malformed or truncated ({type(error).__name__}: {error})"
-        reason = " ".join(reason.split())
+        mistaken = mistaken_format(data, suffix)
+        reason = f"it seems to be {mistaken}" if mistaken else " ".join(reason.split())
         raise MeshFileError(f"{name}: cannot be read as {suffix[1:].upper()}: {reason}") from error
     for remark in remarks:
         logger.warning("%s: %s", name, remark)

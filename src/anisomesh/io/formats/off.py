@@ -9,7 +9,7 @@ import numpy as np
 
 from anisomesh.attributes.model import Mesh
 from anisomesh.io.carried import COLOUR, NORMAL, UV, Array, Carried
-from anisomesh.io.formats.words import coordinates, integers
+from anisomesh.io.formats.words import coordinates, integers, reals, shown
 from anisomesh.io.holding.corners import continuous_corner_data
 from anisomesh.io.holding.losses import Losses
 from anisomesh.io.holding.normals import has_direction, with_all_normals
@@ -34,7 +34,7 @@ def read_off(data: bytes) -> PolygonSoup:
     start = 1 if head.group(2) else 2
     counts = (head.group(2) or (lines[1] if len(lines) > 1 else b"")).split()
     if len(counts) < 2 or not all(count.isdigit() for count in counts[:2]):
-        raise ValueError(f"the line of counts reads {b' '.join(counts)[:40]!r}; expected points, faces and edges")
+        raise ValueError(f"the line of counts reads {shown(b' '.join(counts))}; expected points, faces and edges")
     n_points, n_faces = int(counts[0]), int(counts[1])
     if len(lines) < start + n_points + n_faces:
         raise ValueError(
@@ -54,6 +54,8 @@ def read_off(data: bytes) -> PolygonSoup:
     corners = integers(rows_of_corners, numbers[face_lines])
     colours = [row[size + 1 :] for row, size in zip(tokens, sizes.tolist(), strict=True)]
     carried = _carried(head[0], lines[start : start + n_points], colours)
+    if n_behind := len(lines) - start - n_points - n_faces:
+        carried.remarks.append(f"left out {n_behind} line(s) behind the {n_faces} faces that it declares")
     return PolygonSoup(points=points, corners=corners, sizes=sizes, carried=carried)
 
 
@@ -68,25 +70,39 @@ def _carried(head: bytes, vertices: list[bytes], colours: list[list[bytes]]) -> 
             width = {len(row) for row in rows}
             n_colours = max(width) - 3 * bool(normal) - 2 * bool(texture)
             if len(width) > 1 or (n_colours not in (3, 4) if colour else n_colours != 0):
-                raise ValueError(f"lines of points have {min(width) + 3} to {max(width) + 3} numbers")
+                raise ValueError(f"lines of points have {_span({k + 3 for k in width})} numbers")
             at = 0
             for name, count in ((NORMAL, 3 * bool(normal)), (COLOUR, n_colours), (UV, 2 * bool(texture))):
                 part = [row[at : at + count] for row in rows]
                 at += count
                 if count:
-                    carried.point_data[name] = _colours(part) if name == COLOUR else np.array(part, dtype=np.float64)
+                    carried.point_data[name] = _colours(part) if name == COLOUR else _table(part)
+    elif (n_more := len(b"\n".join(vertices).split()) - 3 * len(vertices)) > 0:
+        carried.remarks.append(f"left out {n_more} number(s) behind coordinates, which its first word does not declare")
     widths = {len(row) for row in colours}
-    if widths & {1, 2, 3, 4}:
+    if any(widths):
         with carried.optional("the colours of faces"):
+            if widths == {1}:
+                raise ValueError("they are numbers of a table of colours that the file does not have")
             if widths not in ({3}, {4}):
-                raise ValueError(f"lines of faces have {min(widths)} to {max(widths)} numbers behind their corners")
+                raise ValueError(f"lines of faces have {_span(widths)} numbers behind their corners; expected 3 or 4")
             carried.cell_data[COLOUR] = _colours(colours)
     return carried
 
 
+def _span(counts: set[int]) -> str:
+    """Return a number, or the smallest and the largest of several."""
+    return str(min(counts)) if len(counts) == 1 else f"{min(counts)} to {max(counts)}"
+
+
+def _table(rows: list[list[bytes]]) -> Array:
+    """Return rows of equally many numbers (n, k)."""
+    return reals([word for row in rows for word in row]).reshape(len(rows), -1)
+
+
 def _colours(rows: list[list[bytes]]) -> Array:
     """Return colours: bytes if they are integers up to 255, otherwise shares of 1."""
-    values = np.array(rows, dtype=np.float64)
+    values = _table(rows)
     is_whole = all(word.isdigit() for row in rows for word in row)
     return values.astype(np.uint8) if is_whole and values.max() <= _BYTE else values
 

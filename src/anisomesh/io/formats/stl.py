@@ -11,7 +11,7 @@ from anisomesh._arrays import Points
 from anisomesh.attributes.model import Mesh, Regions
 from anisomesh.io.carried import Carried
 from anisomesh.io.formats.region_names import divide, in_words, region_texts
-from anisomesh.io.formats.words import BYTE_ORDER_MARK, format_rows
+from anisomesh.io.formats.words import BYTE_ORDER_MARK, format_rows, reals, text_of, with_line_feeds
 from anisomesh.io.holding.divisions import by_label, main_division
 from anisomesh.io.holding.losses import Losses
 from anisomesh.io.polygons import PolygonSoup
@@ -26,7 +26,13 @@ SOLID, ATTRIBUTE = "solid", "attribute"
 _HEADER_BYTES = 84  # of a binary file: 80 of text and the number of triangles
 _TEXT = re.compile(rb"\s*solid.*?\bfacet\s+normal\b", re.DOTALL | re.IGNORECASE)
 _FACET = re.compile(rb"\bfacet\s+normal\b", re.IGNORECASE)
-_SOLID = re.compile(rb"^[ \t]*solid\b([^\n]*)$", re.IGNORECASE | re.MULTILINE)
+_SOLID_LINE = re.compile(
+    rb"^[ \t]*(?P<word>(?:end)?solid\b)(?P<name>[^\n]*?)(?=\bfacet[ \t]+normal(?:[ \t]+[^\s]+){3}[ \t]+outer\b|$)",
+    re.IGNORECASE | re.MULTILINE,
+)  # a line with the name of a solid, on which facets may follow
+_SOLID = b"solid"
+_END_OF_FACET = re.compile(rb"\bendfacet\b", re.IGNORECASE)
+_END_AND_SOLID = re.compile(rb"^([ \t]*endsolid\b[^\n]*?)[ \t](?=solid\b)", re.IGNORECASE | re.MULTILINE)
 _FACET_LINES = "facet normal %r %r %r\n outer loop\n" + 3 * "  vertex %r %r %r\n" + " endloop\nendfacet\n"
 _TRIANGLE = np.dtype([("normal", "<f4", 3), ("corners", "<f4", (3, 3)), ("attribute", "<u2")])
 
@@ -46,9 +52,11 @@ def read_stl(data: bytes) -> PolygonSoup:
     remarks: list[str] = []
     carried = Carried()
     if len(data) != end and _TEXT.match(data.removeprefix(BYTE_ORDER_MARK)):
-        corners = _text_corners(data.lower(), remarks)
+        text = _in_lines(data.removeprefix(BYTE_ORDER_MARK))
+        without_names = _SOLID_LINE.sub(_without_name, text)
+        corners = _text_corners(without_names.lower(), remarks)
         with carried.optional("its solids"):
-            _take_solids(data, carried)
+            _take_solids(text, without_names, carried)
     elif declared < 0:
         raise ValueError(f"truncated: {len(data)} bytes; a binary STL file has at least {_HEADER_BYTES}")
     elif len(data) < end or (data[end:].strip(b"\0") and (len(data) - end) % _TRIANGLE.itemsize == 0):
@@ -67,11 +75,24 @@ def read_stl(data: bytes) -> PolygonSoup:
     return PolygonSoup.from_array(corners[points], inverse.reshape(-1, 3), remarks=remarks, carried=carried)
 
 
-def _take_solids(data: bytes, carried: Carried) -> None:
+def _in_lines(data: bytes) -> bytes:
+    """Return a text whose solids begin on lines of their own, which any white space may separate in the file."""
+    text = with_line_feeds(data)
+    if text.count(b"\n") >= len(_END_OF_FACET.findall(text)):
+        return text
+    return _END_AND_SOLID.sub(rb"\1\n", _END_OF_FACET.sub(b"endfacet\n", text))
+
+
+def _without_name(match: re.Match[bytes]) -> bytes:
+    """Return the beginning of a solid with blanks for its name, in which any word may be."""
+    return match[0][: match.start("name") - match.start()] + b" " * len(match["name"])
+
+
+def _take_solids(text: bytes, without_names: bytes, carried: Carried) -> None:
     """Add the solids, numbered from 1, if there are several or one has a name."""
-    solids = list(_SOLID.finditer(data))
-    texts = [" ".join(match[1].decode("utf-8", errors="replace").split()) for match in solids]
-    facets = np.array([match.start() for match in _FACET.finditer(data)])
+    solids = [match for match in _SOLID_LINE.finditer(text) if match["word"].lower() == _SOLID]
+    texts = [" ".join(text_of(match["name"]).split()) for match in solids]
+    facets = np.array([match.start() for match in _FACET.finditer(without_names)])
     labels = np.searchsorted(np.array([match.start() for match in solids]), facets)
     if any(texts) or len(solids) > 1:
         divide(carried, SOLID, labels, texts, range(1, len(solids) + 1))
@@ -88,7 +109,7 @@ def _text_corners(text: bytes, remarks: list[str]) -> Points:
         )
     if not has_end:
         remarks.append(f"it has no endsolid after its {n_facets} facets; check that none is missing")
-    return np.array([list(map(float, row)) for row in found], dtype=np.float64).reshape(-1, 3)
+    return reals([word for row in found for word in row]).reshape(-1, 3)
 
 
 def stl_bytes(mesh: Mesh, losses: Losses) -> bytes:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import re
 import warnings
-from collections.abc import Iterable
+from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
@@ -16,8 +16,53 @@ BYTE_ORDER_MARK = b"\xef\xbb\xbf"  # of UTF-8
 LINES_AT_ONCE = 100_000
 """Lines that are parsed at once, which limits memory."""
 
+_MOST_CHARACTERS = 60  # characters of a text that a message repeats
 _SPACE = ord(" ")  # codes up to it are white space, or make numbers malformed
 _LARGEST_WHOLE = 2.0**53  # beyond it, not every integer has a float64
+
+
+def text_of(data: bytes) -> str:
+    """Return a text of a file, such as a name, that is in UTF-8, or else in Latin-1, as older programs write it."""
+    try:
+        return data.decode("utf-8")
+    except UnicodeDecodeError:
+        return data.decode("latin-1")
+
+
+def shown(data: bytes) -> str:
+    """Return the beginning of a text of a file for a message, in quotes."""
+    return repr(text_of(data)[:_MOST_CHARACTERS])
+
+
+def with_line_feeds(data: bytes) -> bytes:
+    """Return a text with line feeds at the ends of its lines, of which some may be carriage returns."""
+    return data.replace(b"\r\n", b"\n").replace(b"\r", b"\n") if b"\r" in data else data
+
+
+def reals(words: Sequence[bytes]) -> npt.NDArray[np.float64]:
+    """Return words (n,) as real numbers; ValueError if one is not."""
+    return _numbers(words, float, np.float64, "a number")
+
+
+def wholes(words: Sequence[bytes]) -> Integers:
+    """Return words (n,) as integers; ValueError if one is not, or is too large."""
+    return _numbers(words, int, np.int64, "an integer")
+
+
+def _numbers(words: Sequence[bytes], parse: type, dtype: type, expected: str) -> npt.NDArray[Any]:
+    try:
+        return np.array(list(map(parse, words)), dtype=dtype)
+    except (ValueError, OverflowError):
+        bad = next(word for word in words if not _is(word, parse, dtype))
+        raise ValueError(f"{shown(bad)} is not {expected}") from None
+
+
+def _is(word: bytes, parse: type, dtype: type) -> bool:
+    try:
+        np.array([parse(word)], dtype=dtype)
+    except (ValueError, OverflowError):
+        return False
+    return True
 
 
 def quick_numbers(text: bytes, dtype: type) -> npt.NDArray[Any] | None:
@@ -72,9 +117,11 @@ def coordinates(
     try:
         return np.array([list(map(float, row)) for row in rows], dtype=np.float64).reshape(len(rows), 3)
     except ValueError:
-        bad = next(k for k, row in zip(chosen, rows, strict=True) if len(row) < 3 or not _all_numbers(row))
+        bad = next(
+            k for k, row in zip(chosen, rows, strict=True) if len(row) < 3 or not all(_is(w, float, float) for w in row)
+        )
         number = bad if numbers is None else numbers[bad]
-        raise ValueError(f"line {number + 1} should give three coordinates: {lines[bad][:60]!r}") from None
+        raise ValueError(f"line {number + 1} should give three coordinates: {shown(lines[bad])}") from None
 
 
 def integers(rows: list[list[bytes]], numbers: Integers) -> Integers:
@@ -83,14 +130,7 @@ def integers(rows: list[list[bytes]], numbers: Integers) -> Integers:
         return np.array([int(token) for row in rows for token in row], dtype=np.int64)
     except (ValueError, OverflowError):
         bad = next(k for k, row in enumerate(rows) if not all(re.fullmatch(rb"[+-]?\d{1,18}", word) for word in row))
-        raise ValueError(f"line {numbers[bad] + 1} should give integers: {b' '.join(rows[bad])[:60]!r}") from None
-
-
-def _all_numbers(words: Iterable[bytes]) -> bool:
-    try:
-        return len([float(word) for word in words]) > 0
-    except ValueError:
-        return False
+        raise ValueError(f"line {numbers[bad] + 1} should give integers: {shown(b' '.join(rows[bad]))}") from None
 
 
 def format_rows(pattern: str, table: npt.NDArray[Any]) -> str:

@@ -12,6 +12,7 @@ from urllib.parse import quote, unquote
 from anisomesh.attributes.model import Mesh
 from anisomesh.io.atomic import atomic_path
 from anisomesh.io.formats.obj.attributes import LIBRARIES
+from anisomesh.io.formats.words import BYTE_ORDER_MARK, text_of, with_line_feeds
 from anisomesh.io.holding.losses import Losses
 from anisomesh.io.materials import textures
 from anisomesh.io.materials.textures import absolute_name, is_file, is_in_text
@@ -32,12 +33,18 @@ def read_beside(mesh: Mesh, path: Path) -> tuple[Mesh, tuple[str, ...]]:
         try:
             if file.suffix.lower() != ".mtl":
                 raise OSError("expected a .mtl file")
-            text = file.read_text(encoding="utf-8", errors="surrogateescape")
+            text = _library_text(file)
             texts.append(text if file.parent == folder else textures.moved(text, file.parent, folder, Losses()))
         except (OSError, ValueError) as error:
             losses.append(f"left out the materials of {name!r}: {getattr(error, 'strerror', None) or error}")
     found = {**given, "text": "\n".join(texts), "folder": str(folder)} if texts else given
     return replace(mesh, materials={**mesh.materials, "obj": found}), tuple(losses)
+
+
+def _library_text(file: Path) -> str:
+    """Return the text of a material file, with line feeds at the ends of its lines; each is decoded like names."""
+    lines = with_line_feeds(file.read_bytes().removeprefix(BYTE_ORDER_MARK)).split(b"\n")
+    return "\n".join(map(text_of, lines))
 
 
 def folder_of(path: str | os.PathLike[str]) -> Path:

@@ -114,7 +114,7 @@ def _looks_of_obj(mesh: Mesh, losses: Losses) -> _Looks:
     if not isinstance(obj, Mapping) or not isinstance(text := obj.get("text"), str) or regions is None:
         return {}
     folder, told, lines = Path(obj.get("folder", "")), dict[str, dict[str, str]](), dict[str, str]()
-    for line in text.splitlines():
+    for line in text.split("\n"):
         word, _, rest = line.strip().partition(" ")
         if word.lower() == "newmtl":
             lines = told.setdefault(in_words(rest), {})

@@ -116,7 +116,7 @@ def relative_name(name: str, folder: Path) -> str:
 def moved(text: str, old: Path, new: Path, losses: Losses) -> str:
     """Return materials whose textures have names from a new folder; files that are missing are added to the losses."""
     lines, missing = [], []
-    for line in text.splitlines():
+    for line in text.removesuffix("\n").split("\n"):
         given = texture_line(line, old)
         if given is None or Path(given.name).is_absolute():
             lines.append(line)

@@ -14,7 +14,7 @@ from anisomesh.attributes.model import UNIT, Mesh, Regions
 from anisomesh.io.carried import COLOUR, UV, Array, Integers
 from anisomesh.io.formats.gltf.read import MATERIAL, NODE
 from anisomesh.io.formats.gltf.write import glb_bytes
-from anisomesh.io.formats.gmsh.elements import PHYSICAL
+from anisomesh.io.formats.gmsh.groups import PHYSICAL
 from anisomesh.io.formats.region_names import region_texts
 from anisomesh.io.formats.units import in_unit_of
 from anisomesh.io.formats.vtk.data import ORIGINAL_POINT, blank_rows

@@ -4,18 +4,20 @@ from __future__ import annotations
 
 import json
 import re
-from collections.abc import Callable, Iterator
+from collections.abc import Callable
 from functools import partial
 from typing import NamedTuple
 
 import numpy as np
 import numpy.typing as npt
 
-from anisomesh.io.carried import Array, Carried, Integers, grouped_columns, is_region
-from anisomesh.io.formats.gmsh.elements import PHYSICAL, Entities
+from anisomesh.io.carried import Array, Carried, Division, Integers, grouped_columns, is_region
+from anisomesh.io.formats.gmsh.elements import Entities
+from anisomesh.io.formats.gmsh.groups import PHYSICAL, division_name
 from anisomesh.io.formats.gmsh.numbers import NumberStream
+from anisomesh.io.formats.gmsh.sections import COMMENTS, GmshFile
 from anisomesh.io.formats.region_names import also_named
-from anisomesh.io.formats.words import whole
+from anisomesh.io.formats.words import text_of, whole
 
 COMMENT = "anisomesh regions"
 """Beginning of the comment that names divisions and regions, in JSON."""
@@ -24,24 +26,11 @@ UNLABELLED = "anisomesh points without region"
 """Beginning of the comment with the number of the physical group that only makes points fixed."""
 
 _POINT, _LINE, _SURFACE = 0, 1, 2  # dimensions
-_SKIPPED = (b"Periodic", b"GhostElements", b"PartitionedEntities")
 
 
-def sections(data: bytes, name: bytes) -> Iterator[bytes]:
-    """Yield the contents of all sections of a name that end."""
-    begin, end, at = b"$" + name, b"$End" + name, 0
-    while (first := data.find(begin, at)) >= 0:
-        start, stop = data.find(b"\n", first) + 1, data.find(end, first)
-        if start == 0 or stop < start:
-            return
-        if data[first + len(begin) : start].strip() == b"":
-            yield data[start:stop]
-        at = stop + len(end)
-
-
-def read_comments(data: bytes, carried: Carried) -> dict[str, dict[int, str]]:
+def read_comments(file: GmshFile, carried: Carried) -> dict[str, dict[int, str]]:
     """Return the names of regions by division that a comment of ours has."""
-    for section in sections(data, b"Comments"):
+    for section in file.named(COMMENTS):
         for line in section.splitlines():
             if line.startswith(COMMENT.encode()):
                 with carried.optional("the names of regions"):
@@ -53,9 +42,9 @@ def read_comments(data: bytes, carried: Carried) -> dict[str, dict[int, str]]:
     return {}
 
 
-def read_unlabelled(data: bytes) -> int:
+def read_unlabelled(file: GmshFile) -> int:
     """Return the number of the physical group of points without a label that a comment of ours has, 0 for none."""
-    for section in sections(data, b"Comments"):
+    for section in file.named(COMMENTS):
         found = re.search(rb"^" + UNLABELLED.encode() + rb" (\d{1,10})\s*$", section, re.MULTILINE)
         if found is not None:
             return int(found[1])
@@ -78,7 +67,7 @@ def name_regions(carried: Carried, named: dict[str, dict[int, str]], surface: In
             carried.divisions[name].names.update(names)
 
 
-def read_physical_names(data: bytes, carried: Carried) -> None:
+def read_physical_names(file: GmshFile, carried: Carried) -> None:
     """Name the physical groups of surfaces, lines and points; names of volumes are left out with a remark."""
     divisions = {
         _POINT: carried.fixed_points.divisions,
@@ -86,44 +75,67 @@ def read_physical_names(data: bytes, carried: Carried) -> None:
         _SURFACE: carried.divisions,
     }
     others = []
-    for section in sections(data, b"PhysicalNames"):
+    for section in file.named("PhysicalNames"):
         for dimension, number, name in re.findall(rb"^\s*(\d)\s+(-?\d+)\s+\"([^\"\n]*)\"", section, re.MULTILINE):
-            text = name.decode("utf-8", errors="replace")
+            text = text_of(name)
             if int(dimension) not in divisions:
                 others.append(text)
             elif PHYSICAL in divisions[int(dimension)]:
-                divisions[int(dimension)][PHYSICAL].names[int(number)] = text
+                _division_with(divisions[int(dimension)], int(number)).names[int(number)] = text
             else:
                 also_named(carried, PHYSICAL, [text])
     if others:
         carried.remarks.append(f"left out physical groups of volumes: {', '.join(others)}")
-    skipped = [name.decode() for name in _SKIPPED if b"$" + name in data]
-    if skipped:
-        carried.remarks.append(f"left out its {', '.join(skipped)}")
 
 
-def read_entities(data: bytes, numbers: NumberStream, carried: Carried, *, is_40: bool) -> Entities:
-    """Return the physical group of each entity of version 4 that has one; the first if it is in several."""
+def _division_with(divisions: dict[str, Division], group: int) -> Division:
+    """Return the division that has a physical group; the first one if none has it."""
+    names = [name for name in (division_name(k) for k in range(len(divisions))) if name in divisions]
+    found = (divisions[name] for name in names[1:] if (divisions[name].labels == group).any())
+    return next(found, divisions[PHYSICAL])
+
+
+def read_entities(file: GmshFile, numbers: NumberStream, carried: Carried, *, is_40: bool) -> Entities:
+    """Return the physical groups of each entity of version 4, and of parts of entities in partitions.
+
+    A part without groups of its own has the ones of its entity.
+    """
     entities: Entities = {}
-    n_several = [0, 0, 0, 0]
-    for section in sections(data, b"Entities"):
+    for section in file.named("Entities"):
         with carried.optional("the physical groups"):
             stream = numbers.of(section)
-            counts = whole(stream.take(4, "size")).tolist()
-            for dimension, count in enumerate(counts):
+            for dimension, count in enumerate(whole(stream.take(4, "size")).tolist()):
                 for _ in range(count):
                     tag = int(whole(stream.take(1, "<i4"))[0])
-                    stream.take(3 if dimension == 0 and not is_40 else 6, "<f8")
-                    groups = _tags(stream)
-                    if dimension > 0:
-                        _tags(stream)
-                    if groups:
-                        entities[dimension, tag] = abs(groups[0])  # negative: turned
-                    n_several[dimension] += len(groups) > 1
-    for count, what in zip(n_several, ("point(s)", "curve(s)", "surface(s)"), strict=False):
-        if count:
-            carried.remarks.append(f"{count} {what} are in several physical groups and kept in the first only")
+                    entities[dimension, tag] = _groups(stream, dimension, is_40=is_40)
+    for section in file.named("PartitionedEntities"):
+        carried.remarks.append("left out which partitions its elements are in")
+        with carried.optional("the physical groups of its partitions"):
+            if is_40 and numbers.binary:
+                raise ValueError("it is binary of version 4.0; save it as version 4.1")
+            _read_parts(numbers.of(section), entities, is_40=is_40)
     return entities
+
+
+def _read_parts(stream: NumberStream, entities: Entities, *, is_40: bool) -> None:
+    """Add the parts of entities in partitions, see :func:`read_entities`."""
+    n_ghosts = int(whole(stream.take(2, "size"))[1])
+    stream.take(2 * n_ghosts, "<i4")
+    for dimension, count in enumerate(whole(stream.take(4, "size")).tolist()):
+        for _ in range(count):
+            tag, *parent = whole(stream.take(3, "<i4")).tolist()
+            _tags(stream)  # the partitions
+            groups = _groups(stream, dimension, is_40=is_40)
+            entities[dimension, tag] = groups or entities.get((parent[0], parent[1]), [])
+
+
+def _groups(stream: NumberStream, dimension: int, *, is_40: bool) -> list[int]:
+    """Return the physical groups of an entity, behind its position or box, and pass over its boundary."""
+    stream.take(3 if dimension == 0 and not is_40 else 6, "<f8")
+    groups = _tags(stream)
+    if dimension > 0:
+        _tags(stream)
+    return list(dict.fromkeys(abs(group) for group in groups))  # negative: inverted
 
 
 def _tags(stream: NumberStream) -> list[int]:
@@ -132,30 +144,30 @@ def _tags(stream: NumberStream) -> list[int]:
     return tags
 
 
-def read_data(data: bytes, numbers: NumberStream, carried: Carried, tags: tuple[Integers, Integers]) -> None:
+def read_data(file: GmshFile, numbers: NumberStream, carried: Carried, tags: tuple[Integers, Integers]) -> None:
     """Read $NodeData and $ElementData, of the first time step each; ``tags`` are of the nodes and of the elements."""
     for name, into, rows in (
-        (b"NodeData", carried.point_data, tags[0]),
-        (b"ElementData", carried.cell_data, tags[1]),
+        ("NodeData", carried.point_data, tags[0]),
+        ("ElementData", carried.cell_data, tags[1]),
     ):
-        into |= _first_steps(data, name, carried, partial(_data, numbers, rows))
+        into |= _first_steps(file, name, carried, partial(_data, numbers, rows))
 
 
 def read_data_at_corners(
-    data: bytes, numbers: NumberStream, carried: Carried, tags: Integers, places: Integers
+    file: GmshFile, numbers: NumberStream, carried: Carried, tags: Integers, places: Integers
 ) -> dict[str, Array]:
     """Return $ElementNodeData of the first time step by name, with a row for each node of each element.
 
     Parameters
     ----------
-    data, numbers
+    file, numbers
         The file, and a stream of numbers of its type.
     carried
         Remarks are added here.
     tags, places
         Tags (n,) of the elements, and number of the first node and number of nodes (n, 2) of each.
     """
-    return _first_steps(data, b"ElementNodeData", carried, partial(_data_at_corners, numbers, tags, places))
+    return _first_steps(file, "ElementNodeData", carried, partial(_data_at_corners, numbers, tags, places))
 
 
 def _are_integers(values: Array) -> bool:
@@ -171,11 +183,11 @@ class _Head(NamedTuple):
     body: bytes
 
 
-def _first_steps(data: bytes, section: bytes, carried: Carried, read: Callable[[_Head], Array]) -> dict[str, Array]:
+def _first_steps(file: GmshFile, section: str, carried: Carried, read: Callable[[_Head], Array]) -> dict[str, Array]:
     """Return the data of all sections of a name by their own names, of the first time step each."""
     columns: dict[str, Array] = {}
-    for content in sections(data, section):
-        with carried.optional(f"${section.decode()}"):
+    for content in file.named(section):
+        with carried.optional(f"${section}"):
             head = _head(content)
             values = read(head)
             if head.name in columns:
@@ -197,7 +209,7 @@ def _head(section: bytes) -> _Head:
         at += 1 + count
     if not header[0] or len(header[2]) < 3:
         raise ValueError("it has no name, or no number of components and of rows")
-    name = header[0][0].strip().strip(b'"').decode("utf-8", errors="replace")
+    name = text_of(header[0][0].strip().strip(b'"'))
     width, count = int(header[2][1]), int(header[2][2])
     if not (0 < width < 100 and 0 <= count <= len(section)):
         raise ValueError(f"malformed: {name!r} declares {count} rows of {width} numbers")

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Collection
+from collections.abc import Collection, Sequence
 from dataclasses import replace
 from typing import Any
 
@@ -11,8 +11,9 @@ import numpy.typing as npt
 
 from anisomesh.io.carried import Array, Carried, Integers, Marked
 from anisomesh.io.cells import N_CORNERS, Shape, SurfaceCells
+from anisomesh.io.formats.gmsh.groups import PHYSICAL, Block, division_name, separate, stacked
 from anisomesh.io.formats.gmsh.numbers import NumberStream
-from anisomesh.io.formats.words import whole
+from anisomesh.io.formats.words import shown, whole
 from anisomesh.io.polygons import PolygonSoup
 
 TRIANGLE, LINE, POINT = 2, 1, 15  # types of elements of first order
@@ -34,10 +35,10 @@ _N_NODES = {**_TRIANGLES, **_QUADS, **{kind: n for kinds in _GMSH_OTHERS.values(
 
 _QUADRATIC_LINE = 8
 
-PHYSICAL, GEOMETRICAL = "physical", "geometrical"
-"""Names of the divisions into physical groups and into entities."""
+GEOMETRICAL = "geometrical"
+"""Name of the division into entities."""
 
-Entities = dict[tuple[int, int], int]  # first physical group of an entity, by dimension and tag
+Entities = dict[tuple[int, int], list[int]]  # physical groups of an entity, by dimension and tag
 
 
 class Elements:
@@ -55,31 +56,20 @@ class Elements:
         self._n_nodes = 0
         self._first: list[Integers] = [np.zeros((0, 2), dtype=np.int64)]
         self._table = table
-        self._tags: list[tuple[Integers, Integers]] = []  # cells, rows of number, physical group, entity
+        self._blocks: list[Block] = []
         self._count = 0
-        self._surface: list[Integers] = [np.zeros(0, dtype=np.int64)]
         self._lines, self._points = Marked(), Marked()
+        self._n_unknown = 0  # lines and points of nodes that are not in the file
 
     def take_numbers(self, count: int) -> Integers:
         """Return numbers (count,) for the next cells of the file, counted from 0."""
         self._count += count
         return self._cells.take_numbers(count)
 
-    def add(self, kind: int, nodes: Integers, source: Integers, tags: Integers) -> None:
-        """Add elements of a type.
-
-        Parameters
-        ----------
-        kind
-            The type.
-        nodes
-            Tags of nodes (n, k).
-        source
-            Numbers of the cells (n,).
-        tags
-            Number, physical group and geometrical entity (n, 3).
-        """
-        self._tags.append((source, tags))
+    def add(self, block: Block) -> None:
+        """Add elements of a type."""
+        self._blocks.append(block)
+        kind, nodes, source, _, groups = block
         if kind in _GMSH_SHAPES:
             self._add_surface(kind, self._table.indices(nodes), source)
             return
@@ -88,8 +78,11 @@ class Elements:
             nodes = nodes[:, : 3 if kind == _QUADRATIC_LINE else 2]
             known = self._table.has(nodes).all(axis=1)
             self._lines.add(self._table.indices(nodes[known]), source[known])
+            self._n_unknown += int(np.count_nonzero(~known))
         elif kind == POINT:
-            known = self._table.has(nodes[:, 0]) & (tags[:, 1] != 0)
+            known = self._table.has(nodes[:, 0])
+            self._n_unknown += int(np.count_nonzero(~known))
+            known &= groups.any(axis=1)
             self._points.add(self._table.indices(nodes[known, 0]), source[known])
 
     def _add_surface(self, kind: int, points: Integers, source: Integers) -> None:
@@ -97,7 +90,6 @@ class Elements:
         numbers = self._n_nodes + np.arange(points.size).reshape(points.shape)
         self._n_nodes += points.size
         self._nodes.append(points.ravel())
-        self._surface.append(source)
         self._first.append(np.stack([numbers[:, 0], np.full(len(points), points.shape[1])], axis=1))
         shape = _GMSH_SHAPES[kind]
         self._cells.add(shape, numbers, source, nodes_on_sides=_N_NODES[kind] <= 2 * N_CORNERS[shape] + 1)
@@ -126,28 +118,49 @@ class Elements:
         group ``unlabelled`` have no label.
         """
         carried.lines, carried.fixed_points = self._lines, self._points
-        table = np.zeros((self._count, 3), dtype=np.int64)
-        for source, tags in self._tags:
-            table[source] = tags
-        carried.lines.divide(PHYSICAL, table[:, 1])
-        carried.fixed_points.divide(PHYSICAL, np.where(table[:, 1] == unlabelled, 0, table[:, 1]))
-        physical, entity = table[self.surface][:, 1:].T
-        if physical.any() or PHYSICAL in named:
-            carried.add_cell_data(PHYSICAL, table[:, 1], names={})
+        if self._n_unknown:
+            carried.remarks.append(f"left out {self._n_unknown} line(s) or point(s) of nodes that it does not have")
+        table = np.zeros((self._count, 2), dtype=np.int64)
+        for block in self._blocks:
+            table[block.source] = block.tags
+        for k, labels in enumerate(self._labels(_GMSH_OTHERS["line"], carried)):
+            carried.lines.divide(division_name(k), labels)
+        for k, labels in enumerate(self._labels(_GMSH_OTHERS["point"], carried)):
+            carried.fixed_points.divide(division_name(k), np.where(labels == unlabelled, 0, labels))
+        of_surface = self._labels(_GMSH_SHAPES, carried)
+        for k, labels in enumerate(of_surface):
+            if labels.any() or PHYSICAL in named:
+                carried.add_cell_data(division_name(k), labels, names={})
+        physical, entity = of_surface[0][self.surface], table[self.surface, 1]
         if GEOMETRICAL in named or (len(np.unique(entity)) > 1 and (entity != entities_of(physical)).any()):
-            carried.add_cell_data(GEOMETRICAL, table[:, 2], names={})
+            carried.add_cell_data(GEOMETRICAL, table[:, 1], names={})
         numbers: Integers = table[:, 0]
         return numbers
+
+    def _labels(self, kinds: Collection[int], carried: Carried) -> list[Integers]:
+        """Return the divisions of the elements of some types into physical groups, with a label for each cell (n,)."""
+        blocks = [block for block in self._blocks if block.kind in kinds]
+        divisions, left_out = separate(stacked([block.groups for block in blocks]))
+        if left_out:
+            carried.remarks.append(f"left out {len(left_out)} physical group(s) that overlap too many others")
+        labels = np.zeros((len(divisions), self._count), dtype=np.int64)
+        labels[:, _sources(blocks)] = divisions
+        return list(labels)
 
     @property
     def surface(self) -> Integers:
         """Numbers of the cells of the surface (n,)."""
-        return np.concatenate(self._surface)
+        return _sources([block for block in self._blocks if block.kind in _GMSH_SHAPES])
 
     @property
     def node_places(self) -> Integers:
         """Number of the first node and number of nodes (n, 2) of the cells of the surface."""
         return np.concatenate(self._first)
+
+
+def _sources(blocks: Sequence[Block]) -> Integers:
+    """Return the numbers of the cells (n,) of blocks."""
+    return np.concatenate([np.zeros(0, dtype=np.int64), *(block.source for block in blocks)])
 
 
 def entities_of(physical: Integers) -> Integers:
@@ -157,8 +170,8 @@ def entities_of(physical: Integers) -> Integers:
     return np.unique(physical, return_inverse=True)[1].reshape(-1).astype(np.int64) + 1
 
 
-def elements_2_text(numbers: NumberStream, elements: Elements) -> None:
-    """Read elements of version 2, one a line: number, type, number of tags, tags, nodes."""
+def elements_2_text(numbers: NumberStream, elements: Elements) -> list[Block]:
+    """Return elements of version 2, one a line: number, type, number of tags, tags, nodes."""
     count = numbers.line_count()
     by_type: dict[int, tuple[list[list[int]], list[int], list[list[int]]]] = {}
     for k, line in enumerate(numbers.lines(count)):
@@ -167,21 +180,28 @@ def elements_2_text(numbers: NumberStream, elements: Elements) -> None:
         n_tags = row[2] if len(row) > 2 else -1
         nodes = row[3 + n_tags :] if n_tags >= 0 else []
         if kind in _N_NODES and len(nodes) != _N_NODES[kind]:
-            raise ValueError(f"truncated or malformed: element line {k + 1} reads {line[:60]!r}")
+            raise ValueError(f"truncated or malformed: element line {k + 1} reads {shown(line)}")
         rows, places, tags = by_type.setdefault(kind, ([], [], []))
         rows.append(nodes)
         places.append(k)
         given = row[3 : 3 + min(n_tags, 2)] if n_tags >= 0 else []
         tags.append([row[0] if row else 0, *given, *[0] * (2 - len(given))])
     source = elements.take_numbers(count)
+    blocks = []
     for kind, (rows, places, tags) in by_type.items():
         _check_type(kind)
-        elements.add(kind, np.array(rows, dtype=np.int64), source[places], np.array(tags, dtype=np.int64))
+        blocks.append(_block(kind, np.array(rows, dtype=np.int64), source[places], np.array(tags, dtype=np.int64)))
+    return blocks
 
 
-def elements_2_binary(numbers: NumberStream, elements: Elements) -> None:
-    """Read blocks of elements of version 2: type, number, number of tags, then number, tags and nodes of each."""
-    left = numbers.line_count()
+def _block(kind: int, nodes: Integers, source: Integers, tags: Integers) -> Block:
+    """Return a block of version 2, whose elements have number, physical group and entity (n, 3) as tags."""
+    return Block(kind, nodes, source, tags[:, [0, 2]], tags[:, 1:2])
+
+
+def elements_2_binary(numbers: NumberStream, elements: Elements) -> list[Block]:
+    """Return elements of version 2 in blocks: type, number, number of tags, then number, tags and nodes of each."""
+    left, blocks = numbers.line_count(), []
     while left > 0:
         kind, count, n_tags = whole(numbers.take(3, "<i4")).tolist()
         _check_type(kind)
@@ -191,14 +211,15 @@ def elements_2_binary(numbers: NumberStream, elements: Elements) -> None:
         rows = whole(numbers.take(count * width, "<i4")).reshape(count, width)
         tags = np.zeros((count, 3), dtype=np.int64)
         tags[:, : 1 + min(n_tags, 2)] = rows[:, : 1 + min(n_tags, 2)]
-        elements.add(kind, rows[:, 1 + n_tags :], elements.take_numbers(count), tags)
+        blocks.append(_block(kind, rows[:, 1 + n_tags :], elements.take_numbers(count), tags))
         left -= count
+    return blocks
 
 
-def elements_4(numbers: NumberStream, elements: Elements, entities: Entities, *, is_40: bool) -> None:
-    """Read blocks of elements of version 4: entity, type, number, then number and nodes of each."""
+def elements_4(numbers: NumberStream, elements: Elements, entities: Entities, *, is_40: bool) -> list[Block]:
+    """Return elements of version 4 in blocks: entity, type, number, then number and nodes of each."""
     n_blocks, declared = whole(numbers.take(2 if is_40 else 4, "size"))[:2].tolist()
-    found = 0
+    blocks = []
     for _ in range(n_blocks):
         first, second, kind = whole(numbers.take(3, "<i4")).tolist()
         dimension, entity = (second, first) if is_40 else (first, second)
@@ -206,12 +227,13 @@ def elements_4(numbers: NumberStream, elements: Elements, entities: Entities, *,
         _check_type(kind)
         width = 1 + _N_NODES[kind]
         rows = whole(numbers.take(count * width, "<i4" if is_40 else "size")).reshape(count, width)
-        tags = np.zeros((count, 3), dtype=np.int64)
-        tags[:, 0], tags[:, 1], tags[:, 2] = rows[:, 0], entities.get((dimension, entity), 0), entity
-        elements.add(kind, rows[:, 1:], elements.take_numbers(count), tags)
-        found += count
+        tags = np.column_stack([rows[:, 0], np.full(count, entity, dtype=np.int64)])
+        groups = np.array([entities.get((dimension, entity), [])] * count, dtype=np.int64).reshape(count, -1)
+        blocks.append(Block(kind, rows[:, 1:], elements.take_numbers(count), tags, groups))
+    found = sum(len(block.nodes) for block in blocks)
     if found != declared:
         raise ValueError(f"truncated or malformed: it declares {declared} elements but has {found}")
+    return blocks
 
 
 def _check_type(kind: int) -> None:

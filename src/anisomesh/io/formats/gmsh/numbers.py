@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from anisomesh.io.formats.words import whole
+from anisomesh.io.formats.words import reals, shown, whole
 from anisomesh.io.polygons import Integers
 
 
@@ -42,7 +42,7 @@ class NumberStream:
         """Return the number in the first line, which is text in binary files too; ValueError if it is not a count."""
         line, _, self._bytes = self._bytes.partition(b"\n")
         if not line.strip().isdigit():
-            raise ValueError(f"malformed: {line[:20].decode(errors='replace')!r} is not a count")
+            raise ValueError(f"malformed: {shown(line)} is not a count")
         return int(line)
 
     def lines(self, count: int) -> list[bytes]:
@@ -50,7 +50,15 @@ class NumberStream:
         lines = [line for line in self._bytes.splitlines() if line.strip()]
         if len(lines) < count:
             raise ValueError(f"truncated: it declares {count} lines but {len(lines)} follow")
+        self._bytes = b"\n".join(lines[count:])
         return lines[:count]
+
+    @property
+    def n_left(self) -> int:
+        """How much is left: words of text, or bytes."""
+        if self.binary:
+            return len(self._bytes[self._position :].strip(b"\0\r\n\t "))
+        return len(self._bytes.split()) if self._words is None else len(self._words) - self._position
 
     def take(self, count: int, kind: str) -> npt.NDArray[Any]:
         """Return the next numbers (count,), float64 in a text file; ValueError if there are fewer.
@@ -72,7 +80,7 @@ class NumberStream:
             raise ValueError(f"truncated or malformed: it declares {count} numbers where fewer follow")
         if self._words is None:
             return np.frombuffer(self._bytes[start : self._position], dtype=dtype)
-        return np.array(list(map(float, self._words[start : self._position])), dtype=np.float64)
+        return reals(self._words[start : self._position])
 
     def records(self, count: int, width: int = 3) -> tuple[Integers, npt.NDArray[np.float64]]:
         """Return the next rows of a tag and ``width`` coordinates: tags (count,), coordinates (count, width)."""

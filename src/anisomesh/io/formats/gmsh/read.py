@@ -21,9 +21,17 @@ from anisomesh.io.formats.gmsh.data import (
     read_unlabelled,
 )
 from anisomesh.io.formats.gmsh.elements import Elements, TagTable, elements_2_binary, elements_2_text, elements_4
+from anisomesh.io.formats.gmsh.groups import each_once
 from anisomesh.io.formats.gmsh.numbers import NumberStream
-from anisomesh.io.formats.words import whole
+from anisomesh.io.formats.gmsh.sections import COMMENTS, HEADER, GmshFile
+from anisomesh.io.formats.words import reals, shown, text_of, whole, with_line_feeds
 from anisomesh.io.polygons import Integers, PolygonSoup
+
+_PARAMETRIC = "ParametricNodes"
+_DATA = ("NodeData", "ElementData", "ElementNodeData")
+_GROUPS = ("PhysicalNames", "Entities", "PartitionedEntities")
+_READ = (HEADER, COMMENTS, *_GROUPS, "Nodes", _PARAMETRIC, "Elements", *_DATA)
+_MOST_SHOWN = 200  # characters of a remark
 
 
 def read_msh(data: bytes) -> PolygonSoup:
@@ -34,69 +42,54 @@ def read_msh(data: bytes) -> PolygonSoup:
     Points are in the order of the file, whatever their tags. Parameters of nodes are skipped. Lines are features, and
     points in physical groups are fixed points.
     """
-    version, numbers = _header(data)
-    _check_ends(data)
+    file = GmshFile(data if b"\n" in data else with_line_feeds(data))
+    version, numbers = _header(file)
     is_2, carried = version.startswith("2"), Carried()
-    name = b"ParametricNodes" if is_2 and b"$ParametricNodes" in data else b"Nodes"
-    nodes, section = numbers.of(_section(data, name)), numbers.of(_section(data, b"Elements"))
+    name = _PARAMETRIC if is_2 and _PARAMETRIC in file.names else "Nodes"
+    nodes, section = numbers.of(file.first(name)), numbers.of(file.first("Elements"))
     if is_2:
-        tags, points = _nodes_2(nodes, parametric=name != b"Nodes")
+        tags, points = _nodes_2(nodes, parametric=name == _PARAMETRIC)
     else:
         tags, points = _nodes_4(nodes, interleaved=version == "4.0")
     table = TagTable(tags)
     elements = Elements(table)
     if not is_2:
-        entities = read_entities(data, numbers, carried, is_40=version == "4.0")
-        elements_4(section, elements, entities, is_40=version == "4.0")
-    elif section.binary:
-        elements_2_binary(section, elements)
+        entities = read_entities(file, numbers, carried, is_40=version == "4.0")
+        blocks = elements_4(section, elements, entities, is_40=version == "4.0")
     else:
-        elements_2_text(section, elements)
-    named = read_comments(data, carried)
-    cell_numbers = elements.carry(carried, named, read_unlabelled(data))
-    read_physical_names(data, carried)
-    read_data(data, numbers, carried, (tags, cell_numbers))
+        blocks = each_once((elements_2_binary if section.binary else elements_2_text)(section, elements))
+    for block in blocks:
+        elements.add(block)
+    named = read_comments(file, carried)
+    cell_numbers = elements.carry(carried, named, read_unlabelled(file))
+    read_physical_names(file, carried)
+    read_data(file, numbers, carried, (tags, cell_numbers))
     name_regions(carried, named, elements.surface)
     of_surface = cell_numbers[elements.surface]
-    at_nodes = read_data_at_corners(data, numbers, carried, of_surface, elements.node_places)
+    at_nodes = read_data_at_corners(file, numbers, carried, of_surface, elements.node_places)
+    for what, stream in (("nodes", nodes), ("elements", section)):
+        if stream.n_left:
+            unit = "byte(s)" if stream.binary else "number(s)"
+            carried.remarks.append(f"left out {stream.n_left} {unit} behind the {what} that it declares")
+    if skipped := [other for other in dict.fromkeys(file.names) if other not in _READ]:
+        carried.remarks.append(f"left out its {', '.join(skipped)}"[:_MOST_SHOWN])
     return elements.soup(points, carried, at_nodes)
 
 
-def _header(data: bytes) -> tuple[str, NumberStream]:
+def _header(file: GmshFile) -> tuple[str, NumberStream]:
     """Return the version, 2, 2.2, 4.0 or 4.1, and a stream of numbers of the type of the file."""
-    head = re.match(rb"\s*\$MeshFormat\s+(\S+)\s+(\S+)\s+(\S+)[^\n]*\n", data)
+    content = file.first(HEADER)
+    head = re.match(rb"\s*(\S+)\s+(\S+)\s+(\S+)[^\n]*\n", content)
     if head is None:
-        raise ValueError("it does not begin with $MeshFormat as a Gmsh file does")
-    version, file_type, size = (word.decode(errors="replace") for word in head.groups())
+        raise ValueError(f"its header reads {shown(content)}; expected version, file type and data size")
+    version, file_type, size = map(text_of, head.groups())
     version = "4.0" if version == "4" else version
     if not (version.startswith("2") or version in ("4.0", "4.1")):
         raise ValueError(f"its version is {version[:10]}; expected 2.2, 4.0 or 4.1; save it with -format msh41")
     if file_type not in ("0", "1") or size not in ("4", "8"):
         raise ValueError(f"its header reads {file_type[:10]} {size[:10]}; expected file type 0 or 1, data size 8 or 4")
-    order = ">" if data[head.end() : head.end() + 4] == (1).to_bytes(4, "big") else "<"
+    order = ">" if content[head.end() : head.end() + 4] == (1).to_bytes(4, "big") else "<"
     return version, NumberStream(b"", binary=file_type == "1", order=order, size_bytes=int(size))
-
-
-def _check_ends(data: bytes) -> None:
-    """Raise ValueError if a section begins that does not end: nothing behind it would be read."""
-    section, at = re.compile(rb"^\$(\w+)", re.MULTILINE), 0
-    while (found := section.search(data, at)) is not None:
-        name = found[1]
-        end = data.find(b"$End" + name, found.end())
-        if end < 0:
-            text = name.decode(errors="replace")
-            raise ValueError(f"truncated: its ${text} has no $End{text}")
-        at = end + len(b"$End" + name)
-
-
-def _section(data: bytes, name: bytes) -> bytes:
-    """Return the content of a section, without its first and last line."""
-    first = data.find(b"$" + name)
-    begin = data.find(b"\n", first) + 1
-    end = data.find(b"$End" + name, begin)
-    if first < 0 or begin == 0 or end < begin:
-        raise ValueError(f"truncated: it has no ${name.decode()} with an $End{name.decode()}")
-    return data[begin:end]
 
 
 def _nodes_2(numbers: NumberStream, *, parametric: bool) -> tuple[Integers, npt.NDArray[np.float64]]:
@@ -112,7 +105,7 @@ def _nodes_2(numbers: NumberStream, *, parametric: bool) -> tuple[Integers, npt.
     rows = [line.split()[:4] for line in numbers.lines(count)]
     if any(len(row) < 4 for row in rows):
         raise ValueError("truncated: a line of the parametric nodes has fewer than 4 numbers")
-    table = np.array([list(map(float, row)) for row in rows], dtype=np.float64).reshape(count, 4)
+    table = reals([word for row in rows for word in row]).reshape(count, 4)
     return whole(table[:, 0]), table[:, 1:]
 
 

@@ -12,7 +12,8 @@ from anisomesh._arrays import Points
 from anisomesh.attributes.model import Mesh, Regions
 from anisomesh.io.carried import Array, Integers, separate_columns
 from anisomesh.io.formats.gmsh.data import COMMENT, UNLABELLED
-from anisomesh.io.formats.gmsh.elements import GEOMETRICAL, LINE, PHYSICAL, POINT, TRIANGLE, entities_of
+from anisomesh.io.formats.gmsh.elements import GEOMETRICAL, LINE, POINT, TRIANGLE, entities_of
+from anisomesh.io.formats.gmsh.groups import PHYSICAL
 from anisomesh.io.formats.region_names import empty_regions, in_a_line, region_texts
 from anisomesh.io.holding.corners import continuous_corner_data
 from anisomesh.io.holding.divisions import fits_int32, held_division, main_division

@@ -9,7 +9,8 @@ import numpy as np
 import numpy.typing as npt
 
 from anisomesh.io.carried import Array, Integers
-from anisomesh.io.formats.medit.sections import END, KEYWORDS, SPACE
+from anisomesh.io.formats.medit.keywords import END, KEYWORDS
+from anisomesh.io.formats.medit.sections import SPACE
 from anisomesh.io.holding.divisions import fits_int32
 
 _SHORT, _LONG_POSITIONS, _LONG_INTEGERS = 2, 3, 4  # versions: in the first, integers and positions have 32 bits

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from anisomesh.io.carried import NORMAL, Array, Carried, Integers
+from anisomesh.io.carried import NORMAL, Array, Carried, Integers, listed
 from anisomesh.io.cells import Shape, SurfaceCells
 from anisomesh.io.formats.medit.sections import SPACE, Section, marks, read_sections, table
 from anisomesh.io.formats.words import whole
@@ -45,6 +45,7 @@ def read_medit(data: bytes) -> PolygonSoup:
     points, of_points, cells = [np.zeros((0, SPACE))], [np.zeros(0, dtype=np.int64)], SurfaceCells()
     references, others = [np.zeros(0, dtype=np.int64)], dict[str, Section]()
     numbers: dict[str, list[Integers]] = {}  # of the cells of each section
+    repeated: list[str] = []
     for section in sections:
         name = section.name
         if name == "Vertices":
@@ -62,6 +63,7 @@ def read_medit(data: bytes) -> PolygonSoup:
         elif name.startswith(_VOLUMES):
             cells.ignore(name)
         else:
+            repeated += [name] if name in others else []
             others[name] = section
     required = {name: others.pop(name) for name in _MARKED_FACES if name in others}
     carried = _carried(others, np.concatenate(references), np.concatenate(of_points), dimension)
@@ -70,6 +72,11 @@ def read_medit(data: bytes) -> PolygonSoup:
             of_section = np.concatenate(numbers.get(_MARKED_FACES[name], [np.zeros(0, dtype=np.int64)]))
             chosen = of_section[_within(marks(section), len(of_section))]
             carried.fixed_cells = np.concatenate([carried.fixed_cells, chosen])
+    if repeated:
+        carried.remarks.append(f"left out all but the last of its sections {listed(list(dict.fromkeys(repeated)))}")
+    for section in sections:
+        if section.is_read and section.n_left:
+            carried.remarks.append(f"left out what follows the rows that its section {section.name} declares")
     remarks = () if ends else ("it has no End after its sections; check that none is missing",)
     return cells.soup(np.concatenate(points), remarks, carried)
 
@@ -112,6 +119,8 @@ def _carried(
             if (missing := np.count_nonzero(np.isnan(values).all(axis=1))) and len(place):
                 carried.remarks.append(f"{missing} of {len(values)} vertices have no normal and get NaN")
     unknown = [name for name in sections if name not in _USED and name not in _WITHOUT_CONTENT]
+    if "Normals" in sections and "NormalAtVertices" not in sections:
+        unknown.append("Normals")
     if unknown:
         carried.remarks.append("left out its sections " + ", ".join(unknown)[:200])
     return carried
@@ -120,6 +129,9 @@ def _carried(
 def _take_edges(sections: dict[str, Section], carried: Carried) -> None:
     """Add the edges that are ridges, required or have a reference."""
     if "Edges" not in sections:
+        for name in _MARKED_EDGES:
+            with carried.optional(f"the section {name}"):
+                _within(marks(sections[name]) if name in sections else np.zeros(0, dtype=np.int64), 0)
         return
     rows = whole(table(sections["Edges"], 0, 3).integers)
     chosen = rows[:, 2] != 0
@@ -135,5 +147,5 @@ def _within(numbers: Integers, count: int) -> Integers:
     """Return numbers from 0; ValueError if one is too large or negative."""
     outside = numbers[(numbers < 0) | (numbers >= count)]
     if len(outside):
-        raise ValueError(f"it refers to number {outside[0] + 1} of {count}")
+        raise ValueError(f"it refers to number {outside[0] + 1} of {count}" if count else "the file has none of these")
     return numbers

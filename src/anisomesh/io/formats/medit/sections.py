@@ -1,7 +1,7 @@
 """The sections of MEDIT files, text and binary.
 
-Format: Frey, "MEDIT: an interactive mesh visualization software", INRIA RT-0253; the names, the keywords and the
-layout of binary files are the ones of libMeshb 7, https://github.com/LoicMarechal/libMeshb.
+Format: Frey, "MEDIT: an interactive mesh visualization software", INRIA RT-0253; the layout of binary files is the one
+of libMeshb 7, https://github.com/LoicMarechal/libMeshb.
 """
 
 from __future__ import annotations
@@ -14,71 +14,11 @@ import numpy as np
 import numpy.typing as npt
 
 from anisomesh.io.carried import Integers
-from anisomesh.io.formats.words import whole
-
-KEYWORDS = {
-    "Dimension": 3,
-    "Vertices": 4,
-    "Edges": 5,
-    "Triangles": 6,
-    "Quadrilaterals": 7,
-    "Tetrahedra": 8,
-    "Prisms": 9,
-    "Hexahedra": 10,
-    "Corners": 13,
-    "Ridges": 14,
-    "RequiredVertices": 15,
-    "RequiredEdges": 16,
-    "RequiredTriangles": 17,
-    "RequiredQuadrilaterals": 18,
-    "TangentAtEdgeVertices": 19,
-    "NormalAtVertices": 20,
-    "NormalAtTriangleVertices": 21,
-    "NormalAtQuadrilateralVertices": 22,
-    "AngleOfCornerBound": 23,
-    "TrianglesP2": 24,
-    "EdgesP2": 25,
-    "QuadrilateralsQ2": 27,
-    "TetrahedraP2": 30,
-    "HexahedraQ2": 33,
-    "Pyramids": 49,
-    "BoundingBox": 50,
-    "End": 54,
-    "Tangents": 59,
-    "Normals": 60,
-    "TangentAtVertices": 61,
-    "SolAtVertices": 62,
-    "Comments": 81,
-    "PrismsP2": 86,
-    "PyramidsP2": 87,
-    "QuadrilateralsQ3": 88,
-    "QuadrilateralsQ4": 89,
-    "TrianglesP3": 90,
-    "TrianglesP4": 91,
-    "EdgesP3": 92,
-    "EdgesP4": 93,
-    "TetrahedraP3": 96,
-    "TetrahedraP4": 97,
-    "HexahedraQ3": 98,
-    "HexahedraQ4": 99,
-    "PyramidsP3": 100,
-    "PyramidsP4": 101,
-    "PrismsP3": 102,
-    "PrismsP4": 103,
-    "TrianglesP2Ordering": 129,
-    "TrianglesP3Ordering": 130,
-    "QuadrilateralsQ2Ordering": 131,
-    "QuadrilateralsQ3Ordering": 132,
-    "TrianglesP4Ordering": 144,
-    "QuadrilateralsQ4Ordering": 146,
-    "FloatingPointPrecision": 155,
-}
-"""Numbers of sections in binary files by their names in text."""
+from anisomesh.io.formats.medit.keywords import END, KEYWORDS
+from anisomesh.io.formats.words import reals, text_of, whole, wholes
 
 PLANE, SPACE = 2, 3
 """Dimensions of files: numbers of coordinates of points."""
-
-END = "End"
 
 _NAMES_BY_NUMBER = {code: name for name, code in KEYWORDS.items()}
 _LONG_POSITIONS, _LONG_INTEGERS = 3, 4  # first versions whose positions, and whose integers, have 64 bits
@@ -99,6 +39,10 @@ class Section(Protocol):
     @property
     def n_left(self) -> int:
         """How much is left: words of text, or bytes."""
+
+    @property
+    def is_read(self) -> bool:
+        """Whether something of it was read."""
 
     def count(self) -> int:
         """Return the next number, which counts rows."""
@@ -164,6 +108,10 @@ class _Text:
     def n_left(self) -> int:
         return len(self._words) - self._at
 
+    @property
+    def is_read(self) -> bool:
+        return self._at > 0
+
     def count(self) -> int:
         if not self.n_left or not self._words[self._at].isdigit():
             raise ValueError(f"truncated: the section {self.name} has no count")
@@ -199,24 +147,24 @@ class _Text:
 
     def _integers(self, words: list[bytes]) -> npt.NDArray[Any]:
         try:
-            return np.array(list(map(int, words)), dtype=np.int64)
-        except (ValueError, OverflowError):
+            return wholes(words)
+        except ValueError:
             return self._numbers(words)
 
     def _numbers(self, words: list[bytes]) -> npt.NDArray[np.float64]:
         try:
-            return np.array(list(map(float, words)), dtype=np.float64)
+            return reals(words)
         except ValueError as error:
             raise ValueError(f"malformed: the section {self.name} should give numbers: {error}") from None
 
 
 def _text_sections(data: bytes) -> Iterator[Section]:
-    words = re.sub(rb"#[^\n]*", b"", data).split()
+    words = re.sub(rb"#[^\r\n]*", b"", data).split()
     if not words or not words[0].startswith(b"MeshVersionFormatted"):
         raise ValueError("it does not begin with MeshVersionFormatted as a MEDIT text file does")
     starts = [k for k, word in enumerate(words) if word[:1].isalpha() and word.lower() not in (b"nan", b"inf")]
     for k, end in zip(starts, [*starts[1:], len(words)], strict=True):
-        yield _Text(words[k].decode(errors="replace"), words[k + 1 : end])
+        yield _Text(text_of(words[k]), words[k + 1 : end])
 
 
 class _Layout(NamedTuple):
@@ -236,11 +184,15 @@ class _Binary:
 
     def __init__(self, name: str, data: memoryview, layout: _Layout) -> None:
         self.name = name
-        self._data, self._layout = data, layout
+        self._data, self._layout, self._size = data, layout, len(data)
 
     @property
     def n_left(self) -> int:
         return len(self._data)
+
+    @property
+    def is_read(self) -> bool:
+        return len(self._data) < self._size
 
     def count(self) -> int:
         count = int(self._take(self._layout.integer, 1)[0])

@@ -7,7 +7,7 @@ import numpy as np
 from anisomesh.io.carried import COLOUR, NORMAL, UV, Array, Carried, Integers
 from anisomesh.io.formats.obj.lines import Lines
 from anisomesh.io.formats.region_names import also_named, divide, numbered_regions
-from anisomesh.io.formats.words import LINES_AT_ONCE, quick_numbers, word_starts
+from anisomesh.io.formats.words import LINES_AT_ONCE, quick_numbers, shown, wholes, word_starts
 
 SMOOTHING = "smoothing_group"
 """Name of the smoothing groups (``s``) as face data."""
@@ -18,6 +18,7 @@ DIVISIONS = {"object": b"o", "group": b"g", "material": b"usemtl"}
 OF_LINES = ("object", "group")
 """The divisions that lines have too."""
 
+_WITH_WEIGHT, _WITH_OPACITY = 4, 7  # numbers of a point with a weight, and with a colour and its opacity
 _DEFAULT = "default"  # the name of what has none, by specification
 
 LIBRARIES = "mtllib"
@@ -26,13 +27,19 @@ LIBRARIES = "mtllib"
 
 def take_colours(file: Lines, carried: Carried) -> None:
     """Add the colours of points, which follow their coordinates, as (V, 3) or with opacity (V, 4)."""
+    n_points = len(file.point_lines)
+    n_words = len(word_starts(b"\n".join([file.lines[k] for k in file.point_lines.tolist()])))
+    if n_words == 4 * n_points:
+        return
     with carried.optional("the colours of points"):
-        first = file.lines[file.point_lines[0]].partition(b"#")[0].split() if len(file.point_lines) else []
-        if len(first) >= 7:
-            rows = file.numbers(file.point_lines)
-            if rows.shape[1] < 6:
-                raise ValueError("not every point has one")
+        rows = file.numbers(file.point_lines)
+        widths = {len(file.lines[k].partition(b"#")[0].split()) - 1 for k in file.point_lines.tolist()}
+        if rows.shape[1] >= 6:
             carried.point_data[COLOUR] = rows[:, 3:7]
+        elif max(widths) > _WITH_WEIGHT:  # which only curved surfaces have
+            raise ValueError(f"not every point has one: lines of points have {min(widths)} to {max(widths)} numbers")
+        if min(widths) >= 6 and max(widths) > _WITH_OPACITY:
+            carried.remarks.append("left out the numbers behind the colours of points")
 
 
 def corner_numbers(lines: list[bytes], face_lines: Integers) -> tuple[Integers, Integers] | None:
@@ -82,8 +89,8 @@ def take_corner_data(file: Lines, words: list[list[bytes]] | Integers, sizes: In
         indices = words
     elif any(b"/" in word for row in words for word in row):
         with carried.optional("texture coordinates and normals"):
-            parts = [[int(part) if part else 0 for part in word.split(b"/")[:3]] for row in words for word in row]
-            indices = np.array([[*row, *[0] * (3 - len(row))] for row in parts], dtype=np.int64)
+            parts = [[*word.split(b"/"), b"", b""][:3] for row in words for word in row]
+            indices = wholes([part or b"0" for row in parts for part in row]).reshape(-1, 3)
     for column, word, name, widths in ((1, b"vt", UV, (2, 3)), (2, b"vn", NORMAL, (3, 3))):
         chosen = indices[:, column]
         if not chosen.any():
@@ -129,7 +136,8 @@ def take_divisions(file: Lines, carried: Carried) -> None:
                 divide(carried, name, of_faces, [*[""] * len(before), *used], [*before, *used.values()])
     with carried.optional("its smoothing groups"):
         given = file.of(b"s")
-        labels = np.array([0, *(0 if file.rest(k) in ("off", "") else int(file.rest(k)) for k in given)])
+        texts = [file.rest(k) for k in given]
+        labels = wholes([b"0", *(b"0" if text in ("off", "") else text.encode() for text in texts)])
         of_faces = labels[np.searchsorted(given, file.face_lines)]
         if of_faces.any():
             carried.cell_data[SMOOTHING] = of_faces
@@ -163,8 +171,8 @@ def _points_of_line(file: Lines, number: int, fewest: int) -> Integers:
     """Return the points of a line that lists them, from 0; ValueError if they are fewer or are not in the file."""
     line = file.lines[number]
     before = int(np.searchsorted(file.point_lines, number))
-    raw = [int(text.partition(b"/")[0]) for text in line.partition(b"#")[0].split()[1:]]
+    raw = wholes([text.partition(b"/")[0] for text in line.partition(b"#")[0].split()[1:]]).tolist()
     points = np.array([n - 1 if n > 0 else n + before for n in raw], dtype=np.int64)
     if len(points) < fewest or 0 in raw or (points < 0).any() or (points >= len(file.point_lines)).any():
-        raise ValueError(f"it reads {line[:40]!r}")
+        raise ValueError(f"it reads {shown(line)}")
     return points

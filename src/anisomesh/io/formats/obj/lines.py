@@ -8,7 +8,7 @@ import numpy as np
 import numpy.typing as npt
 
 from anisomesh.io.carried import Integers
-from anisomesh.io.formats.words import quick_table
+from anisomesh.io.formats.words import quick_table, reals, text_of
 
 
 @dataclass(frozen=True, eq=False)
@@ -41,7 +41,7 @@ class Lines:
     def rest(self, number: int) -> str:
         """Return what follows the first word of a line; names may have a # in them, as in files of 3ds Max."""
         words = self.lines[number].strip().split(None, 1)
-        return " ".join(words[1].decode("utf-8", errors="replace").split()) if len(words) > 1 else ""
+        return " ".join(text_of(words[1]).split()) if len(words) > 1 else ""
 
     def numbers(self, chosen: Integers) -> npt.NDArray[np.float64]:
         """Return the numbers of some lines (n, k), as many as the shortest of them has."""
@@ -50,5 +50,4 @@ class Lines:
             return table
         rows = [self.lines[k].partition(b"#")[0].split() for k in chosen]
         width = min(map(len, rows)) - 1
-        table = np.array([float(word) for row in rows for word in row[1 : 1 + width]], dtype=np.float64)
-        return table.reshape(len(rows), width)
+        return reals([word for row in rows for word in row[1 : 1 + width]]).reshape(len(rows), width)

@@ -16,7 +16,7 @@ from anisomesh.io.formats.obj.attributes import (
     take_lines,
 )
 from anisomesh.io.formats.obj.lines import Lines
-from anisomesh.io.formats.words import coordinates, integers
+from anisomesh.io.formats.words import coordinates, integers, shown
 from anisomesh.io.polygons import PolygonSoup
 
 _CURVED = (b"surf", b"bzp", b"bsp", b"cdp", b"res")  # free-form surfaces; the last four are superseded
@@ -32,7 +32,7 @@ def read_obj(data: bytes) -> PolygonSoup:
     back from the last point before the line; a backslash at the end of a line continues it. Lines (``l``) are features
     and points (``p``) fixed points. Free-form surfaces are left out, with a remark.
     """
-    lines = re.sub(rb"\\\r?\n", b" ", data).splitlines()
+    lines = re.sub(rb"\\(?:\r\n|\r|\n)", b" ", data).splitlines()
     kinds = _kinds(lines)
     two_letters = kinds.astype("S2")
     point_lines = np.flatnonzero(two_letters == b"v ")
@@ -42,11 +42,11 @@ def read_obj(data: bytes) -> PolygonSoup:
     face_lines = np.flatnonzero(is_face)
     truncated = np.flatnonzero((kinds == b"v") | (kinds == b"f"))
     if len(truncated):
-        raise ValueError(f"line {truncated[0] + 1} is cut off: {lines[truncated[0]][:40]!r}")
+        raise ValueError(f"line {truncated[0] + 1} is cut off: {shown(lines[truncated[0]])}")
     points = coordinates(lines, point_lines, word=b"v")
     words, sizes = _corners(lines, face_lines)
     if len(sizes) and sizes[-1] < 3 and face_lines[-1] == len(lines) - 1 and not data.endswith(_ENDS_OF_LINES):
-        raise ValueError(f"truncated: the last line is a face of {sizes[-1]} corners: {lines[-1][:40]!r}")
+        raise ValueError(f"truncated: the last line is a face of {sizes[-1]} corners: {shown(lines[-1])}")
     corners = _point_indices(words, face_lines, sizes, point_lines)
     place = np.flatnonzero(np.isin(kinds, [word[:3] for word in _CURVED]))
     curved = [lines[k].split(None, 1)[0].decode() for k in place if lines[k].startswith(_CURVED)]

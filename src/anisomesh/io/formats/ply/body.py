@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Iterator
+from contextlib import contextmanager
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -10,6 +11,9 @@ import numpy.typing as npt
 
 from anisomesh.io.carried import Integers
 from anisomesh.io.formats.ply.header import Element
+from anisomesh.io.formats.words import reals, shown, wholes
+
+_BLANK = b"\0\t\n\r "
 
 
 class PropertyValues(NamedTuple):
@@ -23,12 +27,27 @@ def _truncated(element: Element) -> ValueError:
     return ValueError(f"truncated: the header declares {element.count} x {element.name} and the data ends before")
 
 
+@contextmanager
+def _named(element: Element) -> Iterator[None]:
+    """Put the name of an element in front of errors."""
+    try:
+        yield
+    except ValueError as error:
+        raise ValueError(f"element {element.name}: {error}") from None
+
+
 class TextBody:
     """The body of an ascii file, read as a stream of words."""
 
     def __init__(self, words: list[bytes]) -> None:
         self.words = words
         self.position = 0
+
+    @property
+    def left(self) -> str:
+        """What is behind the elements that were read, in words; empty if nothing is."""
+        count = len(self.words) - self.position
+        return f"{count} word(s)" if count else ""
 
     def read(self, element: Element, wanted: Iterable[str]) -> dict[str, PropertyValues]:
         """Read an element; return the properties with these names."""
@@ -40,7 +59,7 @@ class TextBody:
             for prop in element.properties:
                 if at >= limit:
                     raise _truncated(element)
-                size = int(self.words[at]) if prop.count_type else 1
+                size = self._size(element, at) if prop.count_type else 1
                 if size < 0:
                     raise ValueError(f"element {element.name}: a list of {size} values")
                 at += bool(prop.count_type)
@@ -52,17 +71,20 @@ class TextBody:
             raise _truncated(element)
         self.position = at
         kinds = {prop.name: prop.type for prop in element.properties}
-        return {name: self._column(kinds[name], *found) for name, found in places.items()}
+        with _named(element):
+            return {name: self._column(kinds[name], *found) for name, found in places.items()}
+
+    def _size(self, element: Element, at: int) -> int:
+        """Return the size of the list that begins with a word."""
+        try:
+            return int(self.words[at])
+        except ValueError:
+            raise ValueError(f"element {element.name}: {shown(self.words[at])} is not the size of a list") from None
 
     def _column(self, kind: str, starts: list[int], sizes: list[int]) -> PropertyValues:
         words = self.words
         flat = [word for start, size in zip(starts, sizes, strict=True) for word in words[start : start + size]]
-        values: npt.NDArray[np.float64] | Integers
-        if kind.startswith("f"):
-            values = np.array([float(word) for word in flat], dtype=np.float64)
-        else:
-            values = np.array([int(word) for word in flat], dtype=np.int64)
-        return PropertyValues(values, np.array(sizes, dtype=np.int64))
+        return PropertyValues(reals(flat) if kind.startswith("f") else wholes(flat), np.array(sizes, dtype=np.int64))
 
     def _table(self, element: Element, wanted: Iterable[str]) -> dict[str, PropertyValues]:
         """Read an element of scalars."""
@@ -71,11 +93,8 @@ class TextBody:
         if self.position + count > len(self.words):
             raise _truncated(element)
         self.position += count
-        try:
-            words = self.words[self.position - count : self.position]
-            table = np.array(list(map(float, words)), dtype=np.float64).reshape(element.count, width)
-        except ValueError as error:
-            raise ValueError(f"element {element.name}: {error}") from None
+        with _named(element):
+            table = reals(self.words[self.position - count : self.position]).reshape(element.count, width)
         names = [prop.name for prop in element.properties]
         ones = np.ones(element.count, dtype=np.int64) if width else np.zeros(0, dtype=np.int64)
         return {name: PropertyValues(table[:, names.index(name)], ones) for name in wanted}
@@ -88,6 +107,12 @@ class BinaryBody:
         self.data = data
         self.position = start
         self.order = order
+
+    @property
+    def left(self) -> str:
+        """What is behind the elements that were read, in words; empty if nothing is but white space."""
+        count = len(self.data[self.position :].strip(_BLANK))
+        return f"{count} byte(s)" if count else ""
 
     def read(self, element: Element, wanted: Iterable[str]) -> dict[str, PropertyValues]:
         """Read an element; return the properties with these names."""

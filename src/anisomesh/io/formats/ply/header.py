@@ -2,7 +2,10 @@
 
 from __future__ import annotations
 
+import re
 from dataclasses import dataclass
+
+from anisomesh.io.formats.words import text_of
 
 PLY_TYPES = {
     **dict.fromkeys(("char", "int8"), "i1"),
@@ -60,16 +63,17 @@ class Header:
 
 def read_header(data: bytes) -> Header:
     """Return the header; ValueError if it is malformed."""
-    if data[:4].rstrip() != b"ply":
+    first = re.match(rb"ply[ \t]*(\r\n|\n|\r)", data)
+    if first is None:
         raise ValueError("it does not begin with the line ply")
-    stop = data.find(b"end_header")
-    newline = data.find(b"\n", stop)
-    if stop < 0 or newline < 0:
+    end_of_line = b"\r" if first[1] == b"\r" else b"\n"
+    end = re.search(rb"[\r\n][ \t]*end_header[^\r\n]*(?:\r(?=\n))?" + end_of_line, data)
+    if end is None:
         raise ValueError("truncated: the header has no end_header line")
     order: str | None = None
     elements: list[Element] = []
     comments: list[str] = []
-    for line in data[:stop].decode("utf-8", errors="replace").splitlines()[1:]:
+    for line in map(text_of, data[: end.start()].splitlines()[1:]):
         match line.split():
             case ["format", name, *_]:
                 order = _BYTE_ORDERS.get(name)
@@ -88,7 +92,7 @@ def read_header(data: bytes) -> Header:
                 raise ValueError(f"the header line {line[:60]!r} is malformed; expected element or property")
     if order is None:
         raise ValueError(f"the header names no known format; expected one of {', '.join(_BYTE_ORDERS)}")
-    return Header(order, elements, comments, newline + 1)
+    return Header(order, elements, comments, end.end())
 
 
 def _with_property(element: Element, prop: Property) -> Element:

@@ -66,6 +66,8 @@ def read_ply(data: bytes) -> PolygonSoup:
             _add_edges(element, columns, header.comments, carried)
         elif element.count:
             carried.remarks.append(f"left out {element.count} x {element.name}")
+    if body.left:
+        carried.remarks.append(f"left out {body.left} behind the elements that its header declares")
     _take_comments(header.comments, carried)
     return cells.soup(points, carried=carried)
 

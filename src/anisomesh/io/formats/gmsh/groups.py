@@ -1,0 +1,140 @@
+"""Physical groups of elements that are in several of them."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import NamedTuple
+
+import numpy as np
+
+from anisomesh.io.carried import Integers
+
+PHYSICAL = "physical"
+"""Name of the division into physical groups."""
+
+_MOST_DIVISIONS = 8  # into physical groups that overlap; heuristic
+_MIXED = np.array([0x9E3779B97F4A7C15, 0xC2B2AE3D27D4EB4F, 0x165667B19E3779F9], dtype=np.uint64)  # odd, for hashes
+
+
+class Block(NamedTuple):
+    """Elements of a type.
+
+    Attributes
+    ----------
+    kind
+        The type.
+    nodes
+        Tags of nodes (n, k).
+    source
+        Numbers of the cells (n,) of the file.
+    tags
+        Number and geometrical entity (n, 2).
+    groups
+        Physical groups (n, g), 0 for none.
+    """
+
+    kind: int
+    nodes: Integers
+    source: Integers
+    tags: Integers
+    groups: Integers
+
+
+def division_name(number: int) -> str:
+    """Return the name of a division into physical groups, by its number from 0."""
+    return PHYSICAL if number == 0 else f"{PHYSICAL}_{number + 1}"
+
+
+def stacked(groups: Sequence[Integers]) -> Integers:
+    """Return physical groups of several blocks (n, g) as one array, as wide as the widest of them."""
+    width = max([1, *(rows.shape[1] for rows in groups)])
+    padded = [np.pad(rows, ((0, 0), (0, width - rows.shape[1]))) for rows in groups]
+    return np.concatenate([np.zeros((0, width), dtype=np.int64), *padded])
+
+
+def each_once(blocks: Sequence[Block]) -> list[Block]:
+    """Return elements with all physical groups that they are in, each once.
+
+    Version 2 has an element once for each of its groups. Elements are the same if they have a type, an entity and all
+    nodes in common, but different groups; the first one is kept.
+    """
+    merged = []
+    for kind in dict.fromkeys(block.kind for block in blocks):
+        chosen = [block for block in blocks if block.kind == kind]
+        nodes, source, tags = (np.concatenate([block[k] for block in chosen]) for k in (1, 2, 3))
+        block = Block(kind, nodes, source, tags, stacked([block.groups for block in chosen]))
+        candidates = _alike(block)
+        merged.append(_joined(block, candidates) if len(candidates) else block)
+    return merged
+
+
+def _alike(block: Block) -> Integers:
+    """Return the rows (n,) of elements that may have entity and nodes in common with another, by a hash."""
+    nodes, entities = block.nodes.astype(np.uint64), block.tags[:, 1].astype(np.uint64)
+    hashes = (nodes * (nodes * _MIXED[0] + _MIXED[1])).sum(axis=1, dtype=np.uint64) + entities * _MIXED[2]
+    _, place, counts = np.unique(hashes, return_inverse=True, return_counts=True)
+    return np.flatnonzero(counts[place.reshape(-1)] > 1)
+
+
+def _joined(block: Block, rows: Integers) -> Block:
+    """Return a block with the elements of these rows joined that are the same."""
+    keys = np.column_stack([np.sort(block.nodes[rows], axis=1), block.tags[rows, 1]])
+    key = np.unique(keys, axis=0, return_inverse=True)[1].reshape(-1)
+    group = block.groups[rows, 0]
+    repetition = _place_among_equal(key, group)  # 0 unless an element is repeated with its group
+    slot = _place_among_equal(key, repetition)
+    order = np.lexsort((slot, repetition, key))
+    starts = np.flatnonzero(slot[order] == 0)
+    first = np.empty(len(rows), dtype=np.int64)
+    first[order] = np.repeat(rows[order[starts]], np.diff(starts, append=len(rows)))
+    groups = np.zeros((len(block.nodes), int(slot.max()) + 1), dtype=np.int64)
+    groups[:, 0] = block.groups[:, 0]
+    groups[first, slot] = group
+    kept = np.ones(len(block.nodes), dtype=bool)
+    kept[rows[slot > 0]] = False
+    return Block(block.kind, block.nodes[kept], block.source[kept], block.tags[kept], groups[kept])
+
+
+def _place_among_equal(*keys: Integers) -> Integers:
+    """Return the place (n,), from 0, of each row among the ones that have the same keys (n,), in order."""
+    order = np.lexsort(keys[::-1])
+    is_first = np.ones(len(order), dtype=bool)
+    is_first[1:] = np.any([key[order][1:] != key[order][:-1] for key in keys], axis=0)
+    starts = np.flatnonzero(is_first)
+    places = np.empty(len(order), dtype=np.int64)
+    places[order] = np.arange(len(order)) - np.repeat(starts, np.diff(starts, append=len(order)))
+    return places
+
+
+def separate(groups: Integers) -> tuple[list[Integers], list[int]]:
+    """Divide elements by their physical groups so that each group is as a whole in one division.
+
+    Parameters
+    ----------
+    groups
+        Physical groups (n, g), 0 for none.
+
+    Returns
+    -------
+    divisions
+        Labels (n,), one array for each division. Groups that do not overlap others are in the first one, as is what
+        elements name first.
+    left_out
+        Groups that overlap too many others.
+    """
+    if not groups[:, 1:].any():
+        return [groups[:, 0]], []
+    overlapping: dict[int, set[int]] = {}
+    for row in np.unique(groups, axis=0).tolist():
+        for group in row:
+            overlapping.setdefault(group, set()).update(row)
+    numbers, first = np.unique(groups.T.ravel(), return_index=True)
+    division_of = {0: 0}
+    for group in numbers[np.argsort(first)].tolist():
+        taken = {division_of[other] for other in overlapping[group] - {group, 0} if other in division_of}
+        division_of.setdefault(group, next(k for k in range(len(taken) + 1) if k not in taken))
+    place = np.array([division_of[group] for group in numbers.tolist()])[np.searchsorted(numbers, groups)]
+    n_divisions = min(max(division_of.values()) + 1, _MOST_DIVISIONS)
+    divisions = [np.where(place == k, groups, 0).sum(axis=1) for k in range(n_divisions)]
+    left_out = [group for group, k in division_of.items() if k >= _MOST_DIVISIONS]
+    return divisions, left_out
