@@ -135,6 +135,10 @@ def separate(groups: Integers) -> tuple[list[Integers], list[int]]:
         division_of.setdefault(group, next(k for k in range(len(taken) + 1) if k not in taken))
     place = np.array([division_of[group] for group in numbers.tolist()])[np.searchsorted(numbers, groups)]
     n_divisions = min(max(division_of.values()) + 1, _MOST_DIVISIONS)
-    divisions = [np.where(place == k, groups, 0).sum(axis=1) for k in range(n_divisions)]
+    divisions = []
+    for k in range(n_divisions):
+        is_in = (place == k) & (groups != 0)
+        chosen = groups[np.arange(len(groups)), is_in.argmax(axis=1)]
+        divisions.append(np.where(is_in.any(axis=1), chosen, 0))
     left_out = [group for group, k in division_of.items() if k >= _MOST_DIVISIONS]
     return divisions, left_out
