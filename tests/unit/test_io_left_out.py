@@ -43,7 +43,7 @@ LEFT_OUT = {  # name: content and what the log says
     "bytes behind.ply": (BINARY_PLY + b"more", "left out 4 byte(s) behind the elements that its header declares"),
     "two numbers behind points.obj": (
         OBJ.replace("0\n", "0 9 9\n") + OBJ_FACES,
-        "left out the colours of points: not every point has one: lines of points have 5 to 5 numbers",
+        "left out the colours of points: not every point has one: lines of points have 5 numbers",
     ),
     "late colours.obj": (
         OBJ.replace("v 0 1 0", "v 0 1 0 1 0 0") + OBJ_FACES,

@@ -9,7 +9,7 @@ import numpy as np
 
 from anisomesh.attributes.model import Mesh
 from anisomesh.io.carried import COLOUR, NORMAL, UV, Array, Carried
-from anisomesh.io.formats.words import coordinates, integers, reals, shown
+from anisomesh.io.formats.words import coordinates, integers, reals, shown, span
 from anisomesh.io.holding.corners import continuous_corner_data
 from anisomesh.io.holding.losses import Losses
 from anisomesh.io.holding.normals import has_direction, with_all_normals
@@ -40,7 +40,7 @@ def read_off(data: bytes) -> PolygonSoup:
         raise ValueError(
             f"truncated: it declares {n_points} points and {n_faces} faces but {len(lines) - start} lines follow"
         )
-    points = coordinates(lines, np.arange(start, start + n_points), numbers=numbers)
+    points, _ = coordinates(lines, np.arange(start, start + n_points), numbers=numbers)
     face_lines = np.arange(start + n_points, start + n_points + n_faces)
     tokens = [lines[k].split() for k in face_lines]
     sizes = integers([row[:1] for row in tokens], numbers[face_lines])
@@ -70,7 +70,7 @@ def _carried(head: bytes, vertices: list[bytes], colours: list[list[bytes]]) -> 
             width = {len(row) for row in rows}
             n_colours = max(width) - 3 * bool(normal) - 2 * bool(texture)
             if len(width) > 1 or (n_colours not in (3, 4) if colour else n_colours != 0):
-                raise ValueError(f"lines of points have {_span({k + 3 for k in width})} numbers")
+                raise ValueError(f"lines of points have {span({k + 3 for k in width})} numbers")
             at = 0
             for name, count in ((NORMAL, 3 * bool(normal)), (COLOUR, n_colours), (UV, 2 * bool(texture))):
                 part = [row[at : at + count] for row in rows]
@@ -85,14 +85,9 @@ def _carried(head: bytes, vertices: list[bytes], colours: list[list[bytes]]) -> 
             if widths == {1}:
                 raise ValueError("they are numbers of a table of colours that the file does not have")
             if widths not in ({3}, {4}):
-                raise ValueError(f"lines of faces have {_span(widths)} numbers behind their corners; expected 3 or 4")
+                raise ValueError(f"lines of faces have {span(widths)} numbers behind their corners; expected 3 or 4")
             carried.cell_data[COLOUR] = _colours(colours)
     return carried
-
-
-def _span(counts: set[int]) -> str:
-    """Return a number, or the smallest and the largest of several."""
-    return str(min(counts)) if len(counts) == 1 else f"{min(counts)} to {max(counts)}"
 
 
 def _table(rows: list[list[bytes]]) -> Array:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import logging
 import re
+from collections.abc import Iterator
 
 import numpy as np
 
@@ -25,12 +26,11 @@ SOLID, ATTRIBUTE = "solid", "attribute"
 
 _HEADER_BYTES = 84  # of a binary file: 80 of text and the number of triangles
 _TEXT = re.compile(rb"\s*solid.*?\bfacet\s+normal\b", re.DOTALL | re.IGNORECASE)
-_FACET = re.compile(rb"\bfacet\s+normal\b", re.IGNORECASE)
-_SOLID_LINE = re.compile(
-    rb"^[ \t]*(?P<word>(?:end)?solid\b)(?P<name>[^\n]*?)(?=\bfacet[ \t]+normal(?:[ \t]+[^\s]+){3}[ \t]+outer\b|$)",
-    re.IGNORECASE | re.MULTILINE,
-)  # a line with the name of a solid, on which facets may follow
-_SOLID = b"solid"
+_FACET = re.compile(rb"\bfacet\s+normal\b")
+_SOLID = re.compile(rb"solid\b")
+_SOLID_NAME = re.compile(
+    rb"[^\n]*?(?=\bfacet[ \t]+normal(?:[ \t]+[^\s]+){3}[ \t]+outer\b|\n|\Z)"
+)  # facets may be on its line
 _END_OF_FACET = re.compile(rb"\bendfacet\b", re.IGNORECASE)
 _END_AND_SOLID = re.compile(rb"^([ \t]*endsolid\b[^\n]*?)[ \t](?=solid\b)", re.IGNORECASE | re.MULTILINE)
 _FACET_LINES = "facet normal %r %r %r\n outer loop\n" + 3 * "  vertex %r %r %r\n" + " endloop\nendfacet\n"
@@ -53,10 +53,11 @@ def read_stl(data: bytes) -> PolygonSoup:
     carried = Carried()
     if len(data) != end and _TEXT.match(data.removeprefix(BYTE_ORDER_MARK)):
         text = _in_lines(data.removeprefix(BYTE_ORDER_MARK))
-        without_names = _SOLID_LINE.sub(_without_name, text)
-        corners = _text_corners(without_names.lower(), remarks)
+        words = bytearray(text.lower())
+        solids = list(_take_names(words))
+        corners = _text_corners(words, remarks)
         with carried.optional("its solids"):
-            _take_solids(text, without_names, carried)
+            _divide(carried, words, [(at, text[name]) for at, name in solids])
     elif declared < 0:
         raise ValueError(f"truncated: {len(data)} bytes; a binary STL file has at least {_HEADER_BYTES}")
     elif len(data) < end or (data[end:].strip(b"\0") and (len(data) - end) % _TRIANGLE.itemsize == 0):
@@ -78,27 +79,32 @@ def read_stl(data: bytes) -> PolygonSoup:
 def _in_lines(data: bytes) -> bytes:
     """Return a text whose solids begin on lines of their own, which any white space may separate in the file."""
     text = with_line_feeds(data)
-    if text.count(b"\n") >= len(_END_OF_FACET.findall(text)):
+    if text.count(b"\n") >= text.lower().count(b"endfacet"):
         return text
     return _END_AND_SOLID.sub(rb"\1\n", _END_OF_FACET.sub(b"endfacet\n", text))
 
 
-def _without_name(match: re.Match[bytes]) -> bytes:
-    """Return the beginning of a solid with blanks for its name, in which any word may be."""
-    return match[0][: match.start("name") - match.start()] + b" " * len(match["name"])
+def _take_names(words: bytearray) -> Iterator[tuple[int, slice]]:
+    """Put blanks for the names of solids, in which any word may be; yield where solids begin and their names are."""
+    for match in _SOLID.finditer(bytes(words)):
+        begin = bytes(words[words.rfind(b"\n", 0, match.start()) + 1 : match.start()]).strip()
+        name = _SOLID_NAME.match(words, match.end())
+        if begin in (b"", b"end") and name is not None:
+            words[name.start() : name.end()] = b" " * len(name[0])
+            if not begin:
+                yield match.start(), slice(*name.span())
 
 
-def _take_solids(text: bytes, without_names: bytes, carried: Carried) -> None:
-    """Add the solids, numbered from 1, if there are several or one has a name."""
-    solids = [match for match in _SOLID_LINE.finditer(text) if match["word"].lower() == _SOLID]
-    texts = [" ".join(text_of(match["name"]).split()) for match in solids]
-    facets = np.array([match.start() for match in _FACET.finditer(without_names)])
-    labels = np.searchsorted(np.array([match.start() for match in solids]), facets)
+def _divide(carried: Carried, words: bytearray, solids: list[tuple[int, bytes]]) -> None:
+    """Add the solids, numbered from 1, if there are several or one has a name; where they begin and names are given."""
+    texts = [" ".join(text_of(name).split()) for _, name in solids]
+    facets = np.array([match.start() for match in _FACET.finditer(words)])
+    labels = np.searchsorted(np.array([at for at, _ in solids]), facets)
     if any(texts) or len(solids) > 1:
         divide(carried, SOLID, labels, texts, range(1, len(solids) + 1))
 
 
-def _text_corners(text: bytes, remarks: list[str]) -> Points:
+def _text_corners(text: bytearray, remarks: list[str]) -> Points:
     n_facets, n_closed = len(re.findall(rb"\bfacet\s+normal\b", text)), len(re.findall(rb"\bendfacet\b", text))
     found = re.findall(rb"\bvertex\s+(\S+)\s+(\S+)\s+(\S+)", text)
     has_end = re.search(rb"\bendsolid\b", text) is not None

@@ -34,6 +34,11 @@ def shown(data: bytes) -> str:
     return repr(text_of(data)[:_MOST_CHARACTERS])
 
 
+def span(counts: set[int]) -> str:
+    """Return a number, or the smallest and the largest of several."""
+    return str(min(counts)) if len(counts) == 1 else f"{min(counts)} to {max(counts)}"
+
+
 def with_line_feeds(data: bytes) -> bytes:
     """Return a text with line feeds at the ends of its lines, of which some may be carriage returns."""
     return data.replace(b"\r\n", b"\n").replace(b"\r", b"\n") if b"\r" in data else data
@@ -107,15 +112,18 @@ def quick_table(lines: list[bytes], chosen: Integers, word: bytes = b"") -> npt.
 
 def coordinates(
     lines: list[bytes], chosen: Integers, *, word: bytes = b"", numbers: Integers | None = None
-) -> npt.NDArray[np.float64]:
-    """Parse three coordinates (n, 3) behind a word in the chosen lines; ``numbers`` are the line numbers."""
+) -> tuple[npt.NDArray[np.float64], int | None]:
+    """Parse three coordinates (n, 3) behind a word in the chosen lines; ``numbers`` are the line numbers.
+
+    Also return how many numbers each of these lines has, None if they differ or have other content.
+    """
     table = quick_table(lines, chosen, word)
     if table is not None and table.shape[1] >= 3:
-        return table[:, :3].copy()
+        return table[:, :3].copy(), table.shape[1]
     skip = len(word.split())
     rows = [lines[k].partition(b"#")[0].split()[skip : skip + 3] for k in chosen]
     try:
-        return np.array([list(map(float, row)) for row in rows], dtype=np.float64).reshape(len(rows), 3)
+        return np.array([list(map(float, row)) for row in rows], dtype=np.float64).reshape(len(rows), 3), None
     except ValueError:
         bad = next(
             k for k, row in zip(chosen, rows, strict=True) if len(row) < 3 or not all(_is(w, float, float) for w in row)

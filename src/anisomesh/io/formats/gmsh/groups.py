@@ -6,6 +6,7 @@ from collections.abc import Sequence
 from typing import NamedTuple
 
 import numpy as np
+import numpy.typing as npt
 
 from anisomesh.io.carried import Integers
 
@@ -13,7 +14,8 @@ PHYSICAL = "physical"
 """Name of the division into physical groups."""
 
 _MOST_DIVISIONS = 8  # into physical groups that overlap; heuristic
-_MIXED = np.array([0x9E3779B97F4A7C15, 0xC2B2AE3D27D4EB4F, 0x165667B19E3779F9], dtype=np.uint64)  # odd, for hashes
+_FACTORS = np.array([0x9E3779B97F4A7C15, 0xC2B2AE3D27D4EB4F], dtype=np.uint64)  # odd numbers with mixed bits
+_SHIFT = np.uint64(31)
 
 
 class Block(NamedTuple):
@@ -70,10 +72,19 @@ def each_once(blocks: Sequence[Block]) -> list[Block]:
 
 def _alike(block: Block) -> Integers:
     """Return the rows (n,) of elements that may have entity and nodes in common with another, by a hash."""
-    nodes, entities = block.nodes.astype(np.uint64), block.tags[:, 1].astype(np.uint64)
-    hashes = (nodes * (nodes * _MIXED[0] + _MIXED[1])).sum(axis=1, dtype=np.uint64) + entities * _MIXED[2]
-    _, place, counts = np.unique(hashes, return_inverse=True, return_counts=True)
-    return np.flatnonzero(counts[place.reshape(-1)] > 1)
+    hashes = _hash(block.nodes).sum(axis=1, dtype=np.uint64) + _hash(-block.tags[:, 1])
+    in_order = np.sort(hashes)
+    repeated = in_order[1:][in_order[1:] == in_order[:-1]]
+    return np.flatnonzero(np.isin(hashes, repeated)) if len(repeated) else np.zeros(0, dtype=np.int64)
+
+
+def _hash(numbers: Integers) -> npt.NDArray[np.uint64]:
+    """Return numbers with mixed bits, whose sums hardly ever agree by chance."""
+    mixed = numbers.astype(np.uint64)
+    for factor in _FACTORS:
+        mixed = mixed * factor
+        mixed ^= mixed >> _SHIFT
+    return mixed
 
 
 def _joined(block: Block, rows: Integers) -> Block:

@@ -7,7 +7,7 @@ import numpy as np
 from anisomesh.io.carried import COLOUR, NORMAL, UV, Array, Carried, Integers
 from anisomesh.io.formats.obj.lines import Lines
 from anisomesh.io.formats.region_names import also_named, divide, numbered_regions
-from anisomesh.io.formats.words import LINES_AT_ONCE, quick_numbers, shown, wholes, word_starts
+from anisomesh.io.formats.words import LINES_AT_ONCE, quick_numbers, shown, span, wholes, word_starts
 
 SMOOTHING = "smoothing_group"
 """Name of the smoothing groups (``s``) as face data."""
@@ -27,9 +27,7 @@ LIBRARIES = "mtllib"
 
 def take_colours(file: Lines, carried: Carried) -> None:
     """Add the colours of points, which follow their coordinates, as (V, 3) or with opacity (V, 4)."""
-    n_points = len(file.point_lines)
-    n_words = len(word_starts(b"\n".join([file.lines[k] for k in file.point_lines.tolist()])))
-    if n_words == 4 * n_points:
+    if len(file.point_lines) == 0:
         return
     with carried.optional("the colours of points"):
         rows = file.numbers(file.point_lines)
@@ -37,7 +35,7 @@ def take_colours(file: Lines, carried: Carried) -> None:
         if rows.shape[1] >= 6:
             carried.point_data[COLOUR] = rows[:, 3:7]
         elif max(widths) > _WITH_WEIGHT:  # which only curved surfaces have
-            raise ValueError(f"not every point has one: lines of points have {min(widths)} to {max(widths)} numbers")
+            raise ValueError(f"not every point has one: lines of points have {span(widths)} numbers")
         if min(widths) >= 6 and max(widths) > _WITH_OPACITY:
             carried.remarks.append("left out the numbers behind the colours of points")
 

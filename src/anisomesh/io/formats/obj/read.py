@@ -20,6 +20,7 @@ from anisomesh.io.formats.words import coordinates, integers, shown
 from anisomesh.io.polygons import PolygonSoup
 
 _CURVED = (b"surf", b"bzp", b"bsp", b"cdp", b"res")  # free-form surfaces; the last four are superseded
+_WITHOUT_COLOUR = (3, 4)  # numbers of points, without or with a weight
 _ENDS_OF_LINES = (b"\n", b"\r")
 
 
@@ -43,7 +44,7 @@ def read_obj(data: bytes) -> PolygonSoup:
     truncated = np.flatnonzero((kinds == b"v") | (kinds == b"f"))
     if len(truncated):
         raise ValueError(f"line {truncated[0] + 1} is cut off: {shown(lines[truncated[0]])}")
-    points = coordinates(lines, point_lines, word=b"v")
+    points, n_numbers = coordinates(lines, point_lines, word=b"v")
     words, sizes = _corners(lines, face_lines)
     if len(sizes) and sizes[-1] < 3 and face_lines[-1] == len(lines) - 1 and not data.endswith(_ENDS_OF_LINES):
         raise ValueError(f"truncated: the last line is a face of {sizes[-1]} corners: {shown(lines[-1])}")
@@ -52,7 +53,8 @@ def read_obj(data: bytes) -> PolygonSoup:
     curved = [lines[k].split(None, 1)[0].decode() for k in place if lines[k].startswith(_CURVED)]
     remarks = (f"left out {len(curved)} free-form surface(s) ({curved[0]})",) if curved else ()
     carried, file = Carried(), Lines(lines, kinds, point_lines, face_lines)
-    take_colours(file, carried)
+    if n_numbers not in _WITHOUT_COLOUR:
+        take_colours(file, carried)
     take_corner_data(file, words, sizes, carried)
     take_divisions(file, carried)
     take_lines(file, carried)
