@@ -56,6 +56,8 @@ def read_msh(data: bytes) -> PolygonSoup:
     cell_numbers = elements.carry(carried, named, read_unlabelled(data))
     read_physical_names(data, carried)
     read_data(data, numbers, carried, (tags, cell_numbers))
+    for each, values in carried.cell_data.items():
+        carried.note_marks(each, values)
     name_regions(carried, named, elements.surface)
     of_surface = cell_numbers[elements.surface]
     at_nodes = read_data_at_corners(data, numbers, carried, of_surface, elements.node_places)
