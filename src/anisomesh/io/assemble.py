@@ -63,8 +63,8 @@ def as_mesh(soup: PolygonSoup) -> tuple[Mesh, tuple[str, ...], tuple[str, ...]]:
         materials=carried.materials,
     )
     if carried.lost_at_marks:
-        names = listed(list(map(repr, carried.lost_at_marks)))
-        carried.remarks.append(f"left out cell data {names} of lines and vertices")
+        lost = listed(list(map(repr, carried.lost_at_marks)))
+        carried.remarks.append(f"left out cell data {lost} of lines and vertices")
     _say_empty_regions(carried, mesh)
     return mesh, triangles.remarks, tuple(dict.fromkeys(carried.remarks))
 

@@ -65,9 +65,10 @@ class SetsOfObjects:
 
     def carry(self, carried: Carried) -> None:
         """Add the divisions into sets."""
-        also_named(carried, DIVISION, (each.name for each, _, _ in self._found.values()))
         for each, count, starts in self._found.values():
             with carried.optional(f"the triangle set {each.name!r}"):
                 chosen = (each.rows(count) + np.array(starts)[:, None]).ravel()
-                if len(chosen):
+                if len(chosen) == 0:
+                    also_named(carried, DIVISION, [each.name])
+                else:
                     add_set(carried, DIVISION, each.name, chosen, self._n_faces)
