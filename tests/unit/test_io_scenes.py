@@ -188,6 +188,44 @@ def test_a_glb_file_without_scenes_is_read_with_a_line(tmp_path, caplog):
     assert lines_of(caplog) == ["it has no scene: read each of its meshes once, not moved by its nodes"]
 
 
+def test_instances_of_a_mesh_of_glb(tmp_path, caplog):
+    """Regression: a line said that they are left out, also where a file requires them."""
+    name = "EXT_mesh_gpu_instancing"
+    half = np.sqrt(0.5)
+    offsets = np.array([(0, 0, 5), (3, 0, 0), (0, 0, 0)], dtype="<f4")
+    rotations = np.array([(0, 0, 0, 1), (0, 0, half, half), (0, 0, 0, 1)], dtype="<f4")
+    scales = np.array([(1, 1, 1), (1, 1, 1), (-2, 1, 1)], dtype="<f4")
+    blobs = [SQUARE.tobytes(), offsets.tobytes(), rotations.tobytes(), scales.tobytes()]
+    starts = np.cumsum([0, *map(len, blobs)]).tolist()
+    views = [{"buffer": 0, "byteOffset": at, "byteLength": len(b)} for at, b in zip(starts, blobs, strict=False)]
+    accessors = [
+        {"bufferView": k, "componentType": 5126, "count": len(b) // 4 // width, "type": f"VEC{width}"}
+        for k, (b, width) in enumerate(zip(blobs, (3, 3, 4, 3), strict=True))
+    ]
+    given = {"TRANSLATION": 1, "ROTATION": 2, "SCALE": 3}
+    document = {
+        "meshes": [{"primitives": [{"attributes": {"POSITION": 0}, "mode": 6}]}],
+        "nodes": [{"mesh": 0, "translation": [0, 10, 0], "extensions": {name: {"attributes": given}}}],
+        "scenes": [{"nodes": [0]}],
+        "extensionsUsed": [name],
+        "extensionsRequired": [name],
+        "accessors": accessors,
+        "bufferViews": views,
+        "buffers": [{"byteLength": starts[-1]}],
+    }
+    (tmp_path / "a.glb").write_bytes(glb(document, b"".join(blobs)))
+    surface = load(tmp_path / "a.glb")
+    turned = SQUARE[:, [1, 0, 2]] * (-1, 1, 1)
+    expected = [np.add(SQUARE, (0, 10, 5)), np.add(turned, (3, 10, 0)), np.add(SQUARE * (-2, 1, 1), (0, 10, 0))]
+    np.testing.assert_allclose(surface.points, np.concatenate(expected), atol=1e-6)
+    np.testing.assert_allclose(surface.face_normals, [(0, 0, 1)] * 6, atol=1e-6)
+    assert caplog.text == ""
+    accessors[1]["count"] = 2
+    (tmp_path / "a.glb").write_bytes(glb(document, b"".join(blobs)))
+    with pytest.raises(MeshFileError, match="a node has 2 or 3 copies of its mesh"):
+        load(tmp_path / "a.glb")
+
+
 @pytest.mark.parametrize(
     "name", ["KHR_mesh_quantization", "KHR_texture_transform", "KHR_materials_unlit", "KHR_lights_punctual", "MSFT_lod"]
 )

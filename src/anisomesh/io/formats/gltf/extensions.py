@@ -13,8 +13,7 @@ LEVELS = "MSFT_lod"
 COPIES = "EXT_mesh_gpu_instancing"
 """The extension by which a node shows its mesh several times."""
 
-_GEOMETRY = ("KHR_mesh_quantization", LEVELS)
-_SAID = (COPIES,)  # with a line
+_GEOMETRY = ("KHR_mesh_quantization", LEVELS, COPIES)
 _HANDED_ON = (  # with materials and textures
     "KHR_texture_transform",
     "KHR_texture_basisu",
@@ -48,7 +47,7 @@ def check_compression(names: Sequence[str]) -> None:
 
 def check_required(names: Sequence[str]) -> None:
     """Raise ValueError if a file requires an extension without which its surface would be another."""
-    known = {*_GEOMETRY, *_SAID, *_HANDED_ON, *_NOT_OF_SURFACES}
+    known = {*_GEOMETRY, *_HANDED_ON, *_NOT_OF_SURFACES}
     check_compression(names)
     for name in names:
         if name not in known and not str(name).startswith(_MATERIALS):

@@ -85,8 +85,6 @@ class _Scene:
         remarks = []
         if not self._json.get("scenes") and any("mesh" in node for node in self._json.get("nodes", [])):
             remarks.append("it has no scene: read each of its meshes once, not moved by its nodes")
-        if COPIES in self._json.get("extensionsUsed", []):
-            remarks.append(f"left out copies of its meshes that {COPIES} makes")
         counts = [f"{n:,} {what}(s)" for n, what in ((self._n_lines, "line"), (self._n_dots, "point")) if n]
         if counts:
             remarks.append(f"left out {' and '.join(counts)} that its meshes have besides triangles")
@@ -156,9 +154,23 @@ class _Scene:
         node = self._document.item("nodes", index)
         matrix = above @ _matrix(node)
         if "mesh" in node:
-            self._add_mesh(node["mesh"], matrix, index)
+            for place in self._copies(node):
+                self._add_mesh(node["mesh"], matrix @ place, index)
         for child in node.get("children", []):
             self._add_node(child, matrix, depth + 1)
+
+    def _copies(self, node: dict[str, Any]) -> list[npt.NDArray[np.float64]]:
+        """Return the transformations (4, 4) of the copies of its mesh that a node shows, the identity for one."""
+        given = node.get("extensions", {}).get(COPIES, {}).get("attributes", {})
+        parts = {key: given[key.upper()] for key in ("translation", "rotation", "scale") if key.upper() in given}
+        if not parts:
+            return [np.eye(4)]
+        rows = {key: self._document.numbers(accessor) for key, accessor in parts.items()}
+        counts = sorted({len(values) for values in rows.values()})
+        self._n_instances += counts[-1]
+        if len(counts) > 1 or self._n_instances > _MAX_INSTANCES:
+            raise ValueError(f"malformed: a node has {' or '.join(map(str, counts))} copies of its mesh")
+        return [_matrix({key: values[k] for key, values in rows.items()}) for k in range(counts[0])]
 
     def _add_mesh(self, index: int, matrix: npt.NDArray[np.float64], node: int) -> None:
         self._seen[node] = index
