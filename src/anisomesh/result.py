@@ -12,10 +12,11 @@ from anisomesh._arrays import CornerTensors, PointTensors, Sites
 from anisomesh.attributes.model import Mesh
 from anisomesh.cvt.lbfgs import Status
 from anisomesh.embedding.base import Embedding
-from anisomesh.io.describe import html_table, soundness
+from anisomesh.io.describe import soundness
 from anisomesh.io.fields.save import save_tensors
 from anisomesh.io.rvd import PolygonMesh, save_polygons
 from anisomesh.mesh.geometry import Frame
+from anisomesh.mesh.html import html_table
 from anisomesh.mesh.surface import Surface
 from anisomesh.mesh.validity import Validity
 from anisomesh.metric.conformity import Conformity

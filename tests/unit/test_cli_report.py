@@ -2,12 +2,14 @@
 
 import io
 import json
+import logging
 import sys
 from types import SimpleNamespace
 
 import pytest
 
 from anisomesh.cli import progress as display
+from anisomesh.cli.log import log_on_stderr
 from anisomesh.cli.report import as_json, counted, describe_validity, summary, table
 from anisomesh.metric.names import METRIC_NAMES
 from anisomesh.options import EMBEDDINGS
@@ -27,6 +29,18 @@ SOUND = {
 
 def step(stage, iteration, total=10, energy=None, message=""):
     return SimpleNamespace(stage=stage, iteration=iteration, total=total, energy=energy, message=message)
+
+
+def test_a_name_with_line_breaks_stays_in_its_row():
+    """Regression: a line break in the name of a node broke the table, and the lines of the log."""
+    text = table([("regions", "node: 1 (a/b\r\nc\x1b[2J \u2028d = 0)"), ("unit", "metre")])
+    assert text.splitlines() == ["  regions  node: 1 (a/b c [2J  d = 0)", "  unit     metre"]
+
+
+def test_a_message_of_the_log_is_one_line(capsys):
+    with log_on_stderr(0):
+        logging.getLogger("anisomesh.io").warning("left out %s", "a\nb")
+    assert capsys.readouterr().err == "anisomesh: warning: left out a b\n"
 
 
 def test_json_stays_strict_when_numbers_are_not_finite():

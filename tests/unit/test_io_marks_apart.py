@@ -70,7 +70,7 @@ def test_a_line_is_on_one_block_and_what_is_on_none_is_named(blocks, caplog):
         "left out 1 line(s) whose ends are not points of its surface",
         "left out 1 vertex cell(s) whose points are not points of its surface",
         "left out PointData 'tension' of lines and vertices",
-        "left out CellData 'stress' of lines and vertices",
+        "left out cell data 'stress' of lines and vertices",
     ):
         assert said in caplog.text
 

@@ -3,10 +3,12 @@
 from dataclasses import replace
 from html.parser import HTMLParser
 
+import numpy as np
 import pytest
 
 import anisomesh
-from anisomesh.io.describe import html_table
+from anisomesh.attributes.model import Mesh, Regions
+from anisomesh.mesh.html import html_table
 from anisomesh.shapes.analytic import sphere
 
 BALL = sphere(2)
@@ -61,6 +63,19 @@ def test_an_evaluation_is_one_line_and_a_table(result):
     assert len(repr(evaluation)) < 200
     shown = cells(evaluation._repr_html_())
     assert shown[shown.index("largest distance") + 1] == f"{evaluation.distance.hausdorff:.3g}"
+
+
+def test_surfaces_and_meshes_are_tables():
+    """Regression: they had none in notebooks."""
+    assert cells(BALL._repr_html_()) == ["Surface", "points", "162", "faces", "320"]
+    mesh = Mesh(
+        surface=BALL,
+        point_data={"a<b": np.zeros(162), "c": np.zeros(162)},
+        features=[[0, 1]],
+        regions={"side": Regions(np.zeros(320, dtype=int))},
+    )
+    rows = ["points", "162", "faces", "320", "point data", "a<b, c", "regions", "side", "features", "1"]
+    assert cells(mesh._repr_html_()) == ["Mesh", *rows]
 
 
 def test_tables_are_escaped():

@@ -12,6 +12,7 @@ import numpy.typing as npt
 
 from anisomesh._arrays import EdgeEnds
 from anisomesh.errors import MeshError
+from anisomesh.mesh.html import html_table
 from anisomesh.mesh.surface import Surface
 
 UNIT = "unit"
@@ -150,6 +151,15 @@ class Mesh:
         names = {f.name: len(getattr(self, f.name)) for f in fields(self) if f.name != "surface"}
         carried = ", ".join(f"{count:,} {name}" for name, count in names.items() if count)
         return f"Mesh({self.surface!r}{', ' * bool(carried)}{carried})"
+
+    def _repr_html_(self) -> str:
+        rows = [("points", f"{self.surface.n_points:,}"), ("faces", f"{self.surface.n_faces:,}")]
+        for f in fields(self):
+            given = getattr(self, f.name)
+            if f.name != "surface" and len(given):
+                text = ", ".join(given) if isinstance(given, Mapping) else f"{len(given):,}"
+                rows.append((f.name.replace("_", " "), text))
+        return html_table("Mesh", rows)
 
     @property
     def is_bare(self) -> bool:

@@ -30,7 +30,8 @@ class _Lines(logging.Handler):
 
     def emit(self, record: logging.LogRecord) -> None:
         """Print a record."""
-        line = f"anisomesh: {record.levelname.lower()}: {record.getMessage()}"
+        message = " ".join(record.getMessage().splitlines())  # names in it may have line breaks
+        line = f"anisomesh: {record.levelname.lower()}: {message}"
         if record.levelno >= logging.WARNING:
             if line in self._warned:
                 return

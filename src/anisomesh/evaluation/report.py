@@ -13,12 +13,13 @@ from anisomesh.evaluation.boundary import BoundaryDistance, boundary_distance
 from anisomesh.evaluation.preservation import FeaturePreservation, feature_preservation
 from anisomesh.evaluation.sampled import CREASE_ANGLE, DEFAULT_SAMPLES, SampledMeasures, sampled_measures
 from anisomesh.evaluation.shape import ShapeStatistics, quality_in_reference_metric, shape_statistics
-from anisomesh.io.describe import html_table, soundness
+from anisomesh.io.describe import soundness
 from anisomesh.io.meshes import mesh_of
 from anisomesh.junctions.cut import cut_at_junctions
 from anisomesh.mesh.closest_points import ClosestPoints
 from anisomesh.mesh.distance import SurfaceDistance, surface_distance
 from anisomesh.mesh.geometry import unit_frame
+from anisomesh.mesh.html import html_table
 from anisomesh.mesh.surface import Surface
 from anisomesh.mesh.validity import Validity, check_validity
 from anisomesh.repair.prepare import prepare

@@ -62,6 +62,9 @@ def as_mesh(soup: PolygonSoup) -> tuple[Mesh, tuple[str, ...], tuple[str, ...]]:
         fixed_point_regions=fixed_point_regions,
         materials=carried.materials,
     )
+    if carried.lost_at_marks:
+        lost = listed(list(map(repr, carried.lost_at_marks)))
+        carried.remarks.append(f"left out cell data {lost} of lines and vertices")
     _say_empty_regions(carried, mesh)
     return mesh, triangles.remarks, tuple(dict.fromkeys(carried.remarks))
 

@@ -104,6 +104,8 @@ class Carried:
         Whatever belongs to the file as a whole.
     named
         Names of regions by division that the file gives besides the ones of divisions, since nothing may be in them.
+    lost_at_marks
+        Names of cell data that hold something at lines or points that a mesh is to keep, which have no data.
     remarks
         What was left out, a line each.
     """
@@ -117,6 +119,7 @@ class Carried:
     fixed_cells: Integers = field(default_factory=lambda: np.zeros(0, dtype=np.int64))
     materials: dict[str, Any] = field(default_factory=dict)
     named: dict[str, list[str]] = field(default_factory=dict)
+    lost_at_marks: list[str] = field(default_factory=list)
     remarks: list[str] = field(default_factory=list)
 
     @contextmanager
@@ -151,6 +154,20 @@ class Carried:
                 found |= name in marked.divisions
         if not found or values[elsewhere].any() or names[_SURFACE] is not None:
             self.add_cell_data(name, values, names=names[_SURFACE])
+        self.note_marks(name, values)
+
+    def note_marks(self, name: str, values: Array) -> None:
+        """Note whether data of all cells of the file hold something at lines or points that are in no such division.
+
+        NaN, 0 and empty strings, which stand for no value there, are nothing.
+        """
+        for marked in (self.fixed_points, self.lines):
+            cells = np.concatenate([np.zeros(0, dtype=np.int64), *marked.cells])
+            rows = values[cells[cells >= 0]]
+            is_text = rows.dtype.kind in "SU"
+            nothing = rows == rows.dtype.type() if is_text else ~rows.astype(bool) | (rows != rows)
+            if name not in marked.divisions and name not in self.lost_at_marks and not nothing.all():
+                self.lost_at_marks.append(name)
 
     def take_corners(self, rows: Array) -> None:
         """Take rows of the corner data, given by their numbers or a mask."""

@@ -1,9 +1,6 @@
-"""Words and tables by which results show themselves in shells and notebooks."""
+"""Words by which results show themselves in shells and notebooks."""
 
 from __future__ import annotations
-
-from collections.abc import Sequence
-from html import escape
 
 from anisomesh.mesh.validity import Validity
 
@@ -37,12 +34,3 @@ def faults(validity: Validity) -> list[str]:
 def soundness(validity: Validity) -> str:
     """Return the faults of a remesh in one line, or ``"valid"``."""
     return ", ".join(faults(validity)) or "valid"
-
-
-def html_table(title: str, rows: Sequence[tuple[str, str]]) -> str:
-    """Return rows of names and texts as an HTML table with a title; all of them are escaped."""
-    cells = "".join(
-        f'<tr><th style="text-align:left">{escape(name)}</th><td style="text-align:left">{escape(text)}</td></tr>'
-        for name, text in rows
-    )
-    return f'<table><caption style="text-align:left">{escape(title)}</caption>{cells}</table>'

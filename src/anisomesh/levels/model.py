@@ -8,8 +8,8 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, overload
 
-from anisomesh.io.describe import html_table
 from anisomesh.levels.files import save_meshes
+from anisomesh.mesh.html import html_table
 from anisomesh.result import RemeshResult
 
 

@@ -22,6 +22,7 @@ from anisomesh._arrays import (
 )
 from anisomesh.errors import MeshError
 from anisomesh.mesh import geometry, topology
+from anisomesh.mesh.html import html_table
 
 
 @dataclass(frozen=True, eq=False)
@@ -63,6 +64,9 @@ class Surface:
 
     def __repr__(self) -> str:
         return f"Surface({self.n_points:,} points, {self.n_faces:,} faces)"
+
+    def _repr_html_(self) -> str:
+        return html_table("Surface", [("points", f"{self.n_points:,}"), ("faces", f"{self.n_faces:,}")])
 
     @property
     def n_points(self) -> int:

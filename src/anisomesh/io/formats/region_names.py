@@ -152,3 +152,31 @@ def divide(carried: Carried, name: str, labels: Integers, texts: Sequence[str], 
     table = np.array([label_of.get(code, code) for code in codes.tolist()], dtype=np.int64)
     carried.divisions[name] = Division(labels=table[places.reshape(-1)], names=names)
     return label_of
+
+
+def add_set(carried: Carried, division: str, name: str, chosen: Integers, n_cells: int) -> None:
+    """Add a set of cells, which may overlap others, as a region of a division in which it does not.
+
+    Parameters
+    ----------
+    carried
+        The set is added here.
+    division
+        Name of the first division of such sets; further ones have a number. Cells in no set have the label 0.
+    name
+        Name of the set.
+    chosen
+        Numbers of its cells (n,).
+    n_cells
+        Number of all cells.
+    """
+    number = 1
+    while True:
+        key = division if number == 1 else f"{division} {number}"
+        found = carried.divisions.setdefault(key, Division(labels=np.zeros(n_cells, dtype=np.int64)))
+        if not found.labels[chosen].any():
+            label = len(found.names) + 1
+            found.labels[chosen] = label
+            found.names[label] = name
+            return
+        number += 1

@@ -8,9 +8,9 @@ from typing import Any, cast
 
 import numpy as np
 
-from anisomesh.io.carried import Array, Carried, Division, Integers
+from anisomesh.io.carried import Array, Carried
 from anisomesh.io.cells import Shape, SurfaceCells
-from anisomesh.io.formats.region_names import also_named
+from anisomesh.io.formats.region_names import add_set, also_named
 from anisomesh.io.formats.vtk.data import NAMES_OF_FEATURE_REGIONS, NAMES_OF_POINT_REGIONS, NAMES_OF_REGIONS
 from anisomesh.io.formats.vtk.marks import are_marks
 from anisomesh.io.formats.vtk.pieces import Piece, Pieces
@@ -159,23 +159,12 @@ def _carry_meshio(mesh: Any, carried: Carried) -> None:
     first = np.cumsum([0, *(len(block.data) for block in mesh.cells)])
     for name, blocks in mesh.cell_sets.items():
         with carried.optional(f"the set of cells {name!r}"):
-            rows = [np.asarray(rows, dtype=np.int64) + start for rows, start in zip(blocks, first, strict=False)]
-            _add_set(carried, name, np.concatenate(rows), int(first[-1]))
+            rows = [
+                np.asarray(() if rows is None else rows, dtype=np.int64) + start
+                for rows, start in zip(blocks, first, strict=False)
+            ]
+            add_set(carried, CELL_SET, name, np.concatenate(rows), int(first[-1]))
     for name, division in list(carried.divisions.items()):
         if name.startswith(CELL_SET):
             del carried.divisions[name]
             carried.add_data_of_all_cells(name, division.labels, [division.names] * _N_DIMENSIONS)
-
-
-def _add_set(carried: Carried, name: str, chosen: Integers, n_cells: int) -> None:
-    """Add a set of cells to the first division whose sets it does not overlap; cells of no set have the label 0."""
-    number = 1
-    while True:
-        key = CELL_SET if number == 1 else f"{CELL_SET} {number}"
-        division = carried.divisions.setdefault(key, Division(labels=np.zeros(n_cells, dtype=np.int64)))
-        if not division.labels[chosen].any():
-            label = len(division.names) + 1
-            division.labels[chosen] = label
-            division.names[label] = name
-            return
-        number += 1

@@ -12,6 +12,8 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
+from anisomesh.io.formats.gltf.extensions import check_compression, check_required
+
 JSON_CHUNK, BINARY_CHUNK = b"JSON", b"BIN\0"
 
 COMPONENTS = {5120: "i1", 5121: "u1", 5122: "i2", 5123: "u2", 5125: "u4", 5126: "f4"}
@@ -20,12 +22,14 @@ COMPONENTS = {5120: "i1", 5121: "u1", 5122: "i2", 5123: "u2", 5125: "u4", 5126: 
 WIDTHS = {"SCALAR": 1, "VEC2": 2, "VEC3": 3, "VEC4": 4}
 """Numbers of the components of accessors."""
 
-_COMPRESSED = ("KHR_draco_mesh_compression", "EXT_meshopt_compression")
-_MAX_SPARSE = 10_000_000  # rows of an accessor that are zero but for some
+_MAX_ZEROS = 10_000_000  # rows of an accessor that no data are in the file for
 
 
 class Document:
-    """The JSON of a file, and access to its arrays; ValueError if the file is no GLB, truncated or compressed."""
+    """The JSON of a file, and access to its arrays.
+
+    ValueError if the file is no GLB, truncated, or requires an extension that is not supported.
+    """
 
     def __init__(self, data: bytes) -> None:
         declared = int.from_bytes(data[8:12], "little")
@@ -37,10 +41,18 @@ class Document:
         if JSON_CHUNK not in chunks:
             raise ValueError("truncated: it has no chunk of JSON")
         self.json: dict[str, Any] = json.loads(chunks[JSON_CHUNK])
+        if not isinstance(self.json, dict):
+            raise ValueError("malformed: its JSON is not an object")
         self._binary = chunks.get(BINARY_CHUNK, b"")
-        used = [name for name in _COMPRESSED if name in self.json.get("extensionsRequired", [])]
-        if used:
-            raise ValueError(f"it is compressed with {used[0]}, which is not supported; save it without compression")
+        check_required(self.json.get("extensionsRequired", []))
+
+    def item(self, kind: str, index: Any) -> dict[str, Any]:
+        """Return a node, mesh, accessor or other member of a list of the JSON; ValueError if there is none."""
+        found = self.json.get(kind, [])
+        if index_of(index) >= len(found):
+            raise ValueError(f"malformed: it refers to number {index} (counted from 0) of its {len(found)} {kind}")
+        item: dict[str, Any] = found[index]
+        return item
 
     def numbers(self, accessor: int) -> npt.NDArray[Any]:
         """Return the rows (n, k) of an accessor; normalised integers as numbers up to 1."""
@@ -49,14 +61,18 @@ class Document:
 
     def rows(self, accessor: int) -> tuple[npt.NDArray[Any], bool]:
         """Return the rows (n, k) of an accessor as they are, and whether they are normalised integers."""
-        found = self.json["accessors"][index_of(accessor)]
+        found = self.item("accessors", accessor)
+        if found["componentType"] not in COMPONENTS or found["type"] not in WIDTHS:
+            given = f"{found['type']!r} of the component type {found['componentType']!r}"
+            raise ValueError(f"an accessor has the type {given}; expected one of {', '.join(WIDTHS)}")
         kind, width = np.dtype("<" + COMPONENTS[found["componentType"]]), WIDTHS[found["type"]]
         count = index_of(found["count"])
         if "bufferView" in found:
             rows = self._rows(found["bufferView"], found.get("byteOffset", 0), count, kind, width)
         else:
-            if "sparse" not in found or count > _MAX_SPARSE:
-                raise ValueError("malformed: an accessor has no data")
+            check_compression(self.json.get("extensionsUsed", []))  # the data are there, if this says so
+            if count > _MAX_ZEROS:
+                raise ValueError(f"malformed: an accessor declares {count} rows without data")
             rows = np.zeros((count, width), dtype=kind)
         if "sparse" in found:
             rows = rows.copy()
@@ -64,11 +80,13 @@ class Document:
             n, where, values = index_of(sparse["count"]), sparse["indices"], sparse["values"]
             place = np.dtype("<" + COMPONENTS[where["componentType"]])
             at = self._rows(where["bufferView"], where.get("byteOffset", 0), n, place, 1).ravel()
+            if n and at.max() >= count:
+                raise ValueError(f"malformed: a sparse accessor refers to row {at.max()} of its {count}")
             rows[at] = self._rows(values["bufferView"], values.get("byteOffset", 0), n, kind, width)
         return rows, bool(found.get("normalized")) and kind.kind in "iu"
 
     def _rows(self, view: int, offset: int, count: int, kind: np.dtype[Any], width: int) -> npt.NDArray[Any]:
-        found = self.json["bufferViews"][index_of(view)]
+        found = self.item("bufferViews", view)
         data = self.view(view)
         row = width * kind.itemsize
         stride = index_of(found.get("byteStride", 0)) or row
@@ -80,13 +98,13 @@ class Document:
 
     def view(self, view: int) -> bytes:
         """Return the bytes of a view of a buffer."""
-        found = self.json["bufferViews"][index_of(view)]
-        data = self._buffer(index_of(found["buffer"]))
+        found = self.item("bufferViews", view)
+        data = self._buffer(found["buffer"])
         begin = index_of(found.get("byteOffset", 0))
         return data[begin : begin + index_of(found["byteLength"])]
 
     def _buffer(self, index: int) -> bytes:
-        uri = self.json["buffers"][index].get("uri")
+        uri = self.item("buffers", index).get("uri")
         if uri is None:
             return self._binary
         if not str(uri).startswith("data:"):

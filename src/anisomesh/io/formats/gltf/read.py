@@ -15,6 +15,7 @@ from anisomesh.io.carried import Carried, listed
 from anisomesh.io.cells import SurfaceCells, strip_triangles
 from anisomesh.io.formats.gltf.attributes import Attributes, read_attributes
 from anisomesh.io.formats.gltf.document import Document, index_of
+from anisomesh.io.formats.gltf.extensions import COPIES, LEVELS
 from anisomesh.io.formats.gltf.materials import read_materials
 from anisomesh.io.formats.region_names import also_named, divide, is_number
 from anisomesh.io.formats.units import OF_GLB
@@ -26,11 +27,8 @@ NODE, MATERIAL = "node", "material"
 NO_MATERIAL = -1
 """Label of faces without a material."""
 
-LEVELS = "MSFT_lod"
-"""The extension by which a node names the nodes with its coarser levels of detail."""
-
-TRIANGLES, _STRIP, _FAN = 4, 5, 6  # modes of a primitive; lower ones are points and lines
-_COPIES = "EXT_mesh_gpu_instancing"
+TRIANGLES, _STRIP, _FAN = 4, 5, 6  # modes of a primitive
+_POINTS, _LINES, _LINE_STRIP = 0, 1, 3
 _DEEPEST = 200  # of nodes in nodes
 _MAX_INSTANCES = 100_000
 _NOT_KEPT = ("animations", "skins", "cameras")
@@ -44,7 +42,10 @@ def read_glb(data: bytes) -> PolygonSoup:
     Nodes and materials are divisions; texture coordinates, colours, normals and others are point data, since points are
     repeated along seams. Texture coordinates have their origin at the lower left, as in OBJ.
     """
-    return _Scene(Document(data)).soup()
+    try:
+        return _Scene(Document(data)).soup()
+    except KeyError as error:
+        raise ValueError(f"malformed: a part of its JSON lacks {error}") from error
 
 
 class _Scene:
@@ -55,7 +56,7 @@ class _Scene:
         self._json = document.json
         self._cells = SurfaceCells()
         self._points: list[npt.NDArray[np.float64]] = [np.zeros((0, 3))]
-        self._n_points = 0
+        self._n_points = self._n_lines = self._n_dots = 0  # lines and points that are primitives
         self._n_instances = 0
         self._coarser = _coarser_levels(self._json)
         self._carried = Carried()
@@ -69,10 +70,10 @@ class _Scene:
         """Return the meshes of the scene, or all meshes of a file without scenes."""
         scenes = self._json.get("scenes", [])
         if scenes:
-            for node in scenes[self._json.get("scene", 0)].get("nodes", []):
+            for node in self._document.item("scenes", self._json.get("scene", 0)).get("nodes", []):
                 self._add_node(node, np.eye(4), 0)
         else:
-            coarser = {self._json["nodes"][node].get("mesh") for node in self._coarser}
+            coarser = {self._document.item("nodes", node).get("mesh") for node in self._coarser}
             for mesh in range(len(self._json.get("meshes", []))):
                 if mesh not in coarser:
                     self._add_mesh(mesh, np.eye(4), mesh)
@@ -82,8 +83,11 @@ class _Scene:
     def _left_out(self) -> tuple[str, ...]:
         """Return what of the geometry is left out, a line each."""
         remarks = []
-        if _COPIES in self._json.get("extensionsUsed", []):
-            remarks.append(f"left out copies of its meshes that {_COPIES} makes")
+        if not self._json.get("scenes") and any("mesh" in node for node in self._json.get("nodes", [])):
+            remarks.append("it has no scene: read each of its meshes once, not moved by its nodes")
+        counts = [f"{n:,} {what}(s)" for n, what in ((self._n_lines, "line"), (self._n_dots, "point")) if n]
+        if counts:
+            remarks.append(f"left out {' and '.join(counts)} that its meshes have besides triangles")
         hidden = self._hidden_meshes()
         if hidden:
             remarks.append(f"left out {len(hidden)} mesh(es) that are not in its scene: {listed(hidden)}")
@@ -119,7 +123,7 @@ class _Scene:
                 divide(carried, NODE, nodes, texts, used)
         with carried.optional("its materials"):
             if (materials >= 0).any():
-                given = self._json["materials"]
+                given = self._json.get("materials", [])
                 texts = [str(material.get("name", "")) for material in given]
                 if any(map(is_number, texts)) and all(material.keys() == {"name"} for material in given):
                     divide(carried, MATERIAL, materials, texts, range(len(texts)))
@@ -137,9 +141,9 @@ class _Scene:
     def _node_name(self, label: int) -> str:
         """Return the name of a node or, if it has none, of its mesh."""
         if not self._json.get("scenes"):
-            return str(self._json["meshes"][label].get("name", ""))
-        node = self._json["nodes"][label]
-        return str(node.get("name") or self._json["meshes"][node["mesh"]].get("name", ""))
+            return str(self._document.item("meshes", label).get("name", ""))
+        node = self._document.item("nodes", label)
+        return str(node.get("name") or self._document.item("meshes", node["mesh"]).get("name", ""))
 
     def _add_node(self, index: int, above: npt.NDArray[np.float64], depth: int) -> None:
         self._n_instances += 1
@@ -147,19 +151,34 @@ class _Scene:
             raise ValueError("malformed: its nodes contain each other")
         if index in self._coarser:
             return
-        node = self._json["nodes"][index_of(index)]
+        node = self._document.item("nodes", index)
         matrix = above @ _matrix(node)
         if "mesh" in node:
-            self._add_mesh(node["mesh"], matrix, index)
+            for place in self._copies(node):
+                self._add_mesh(node["mesh"], matrix @ place, index)
         for child in node.get("children", []):
             self._add_node(child, matrix, depth + 1)
 
+    def _copies(self, node: dict[str, Any]) -> list[npt.NDArray[np.float64]]:
+        """Return the transformations (4, 4) of the copies of its mesh that a node shows, the identity for one."""
+        given = node.get("extensions", {}).get(COPIES, {}).get("attributes", {})
+        parts = {key: given[key.upper()] for key in ("translation", "rotation", "scale") if key.upper() in given}
+        if not parts:
+            return [np.eye(4)]
+        rows = {key: self._document.numbers(accessor) for key, accessor in parts.items()}
+        counts = sorted({len(values) for values in rows.values()})
+        self._n_instances += counts[-1]
+        if len(counts) > 1 or self._n_instances > _MAX_INSTANCES:
+            raise ValueError(f"malformed: a node has {' or '.join(map(str, counts))} copies of its mesh")
+        return [_matrix({key: values[k] for key, values in rows.items()}) for k in range(counts[0])]
+
     def _add_mesh(self, index: int, matrix: npt.NDArray[np.float64], node: int) -> None:
         self._seen[node] = index
-        for primitive in self._json["meshes"][index_of(index)]["primitives"]:
+        for primitive in self._document.item("meshes", index)["primitives"]:
             mode = primitive.get("mode", TRIANGLES)
             if mode < TRIANGLES:
                 self._cells.ignore("line or point")
+                self._count(primitive, mode)
                 continue
             if mode > _FAN:
                 raise ValueError(f"malformed: a primitive has the mode {mode}; expected 0 to 6")
@@ -178,6 +197,15 @@ class _Scene:
             material = primitive.get("material", NO_MATERIAL)
             self._nodes.append(np.full(len(triangles), node))
             self._materials.append(np.full(len(triangles), material if isinstance(material, int) else NO_MATERIAL))
+
+    def _count(self, primitive: dict[str, Any], mode: int) -> None:
+        """Count the lines or points of a primitive."""
+        accessor = primitive.get("indices", primitive["attributes"]["POSITION"])
+        n = index_of(self._document.item("accessors", accessor)["count"])
+        if mode == _POINTS:
+            self._n_dots += n
+        else:
+            self._n_lines += n // 2 if mode == _LINES else max(n - (mode == _LINE_STRIP), 0)
 
     def _first_point(self, primitive: dict[str, Any], points: npt.NDArray[Any], matrix: npt.NDArray[np.float64]) -> int:
         """Return the first of the vertices of a primitive, which are added unless another one shares them."""

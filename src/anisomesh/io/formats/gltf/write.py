@@ -12,8 +12,9 @@ from anisomesh.attributes.model import Mesh, Regions
 from anisomesh.io.carried import UV, Integers
 from anisomesh.io.formats.gltf.attributes import TEXTURE_COORDINATES, Encoded, encoded
 from anisomesh.io.formats.gltf.document import BINARY_CHUNK, COMPONENTS, JSON_CHUNK, WIDTHS
+from anisomesh.io.formats.gltf.extensions import LEVELS
 from anisomesh.io.formats.gltf.materials import write_materials
-from anisomesh.io.formats.gltf.read import LEVELS, MATERIAL, NO_MATERIAL, NODE, TRIANGLES
+from anisomesh.io.formats.gltf.read import MATERIAL, NO_MATERIAL, NODE, TRIANGLES
 from anisomesh.io.formats.region_names import region_texts
 from anisomesh.io.holding.corners import distinct_corners
 from anisomesh.io.holding.divisions import by_label, main_division

@@ -64,6 +64,8 @@ def read_msh(data: bytes) -> PolygonSoup:
     cell_numbers = elements.carry(carried, named, read_unlabelled(file))
     read_physical_names(file, carried)
     read_data(file, numbers, carried, (tags, cell_numbers))
+    for each, values in carried.cell_data.items():
+        carried.note_marks(each, values)
     name_regions(carried, named, elements.surface)
     of_surface = cell_numbers[elements.surface]
     at_nodes = read_data_at_corners(file, numbers, carried, of_surface, elements.node_places)

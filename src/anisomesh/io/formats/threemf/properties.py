@@ -30,6 +30,7 @@ class Properties:
         self._colours: list[Integers] = []
         self._coordinates: list[Array] = []
         self._textures: list[Integers] = []
+        self._n_mixed = self._n_beyond = 0  # faces with several materials, or with members that there are not
         self._known_textures: dict[str, tuple[int, dict[str, str]]] = {}  # label and attributes by part
 
     def add(self, name: str, rows: Integers, default: tuple[int, int], model: Resources, *, turned: bool) -> None:
@@ -55,6 +56,7 @@ class Properties:
         rows[without, 0] = default[0]
         rows[without & (rows[:, 1] == NONE), 1] = default[1]
         rows[:, 2:] = np.where(rows[:, 2:] == NONE, rows[:, 1:2], rows[:, 2:])
+        first = rows[:, 1].copy()
         if turned:
             rows = rows[:, [0, 3, 2, 1]]
         labels, colours = np.zeros(len(rows), dtype=np.int64), np.full((len(rows), 3, 4), 255, dtype=np.int64)
@@ -63,7 +65,9 @@ class Properties:
             chosen = np.flatnonzero(rows[:, 0] == group)
             if group in model.materials:
                 found = [self._known.setdefault(key, len(self._known) + 1) for key in model.materials[group]]
-                labels[chosen] = _members(np.array([0, *found]), rows[chosen, 1])
+                table = np.array([0, *found])
+                labels[chosen] = _members(table, first[chosen])
+                self._n_mixed += int(np.count_nonzero((rows[chosen, 1:] != first[chosen, None]).any(axis=1)))
             elif group in model.colours:
                 table = np.array([_WHITE, *map(_rgba, model.colours[group])])
                 colours[chosen] = _members(table, rows[chosen, 1:])
@@ -72,6 +76,9 @@ class Properties:
                 textures[chosen] = self._texture_label(model.textures.get(given.texture, {}))
                 table = np.concatenate([np.full((1, 2), np.nan), given.coordinates])
                 coordinates[chosen] = _members(table, rows[chosen, 1:])
+            else:
+                continue
+            self._n_beyond += int(np.count_nonzero((rows[chosen, 1:] >= len(table) - 1).any(axis=1)))
         self._materials.append(labels)
         self._colours.append(colours)
         self._textures.append(textures)
@@ -96,6 +103,11 @@ class Properties:
             label_of = divide(carried, MATERIAL, materials, names, given)
             colours_of = {label_of[label]: colour for (_, colour), label in self._known.items()}
             carried.materials["display_colours"] = colours_of
+        if self._n_beyond:
+            what = "materials, colours or texture coordinates that there are not"
+            carried.remarks.append(f"{self._n_beyond:,} face(s) refer to {what}")
+        if self._n_mixed:
+            carried.remarks.append(f"{self._n_mixed:,} face(s) have several materials and keep the first only")
         colours = np.concatenate([np.zeros((0, 3, 4), dtype=np.int64), *self._colours])
         if (colours != 255).any():
             carried.corner_data[COLOUR] = colours.reshape(-1, 4).astype(np.uint8)

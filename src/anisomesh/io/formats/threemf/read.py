@@ -19,14 +19,17 @@ from anisomesh.attributes.model import UNIT
 from anisomesh.io.carried import Carried, listed
 from anisomesh.io.cells import SurfaceCells
 from anisomesh.io.formats.region_names import also_named
+from anisomesh.io.formats.threemf.extensions import check_required
 from anisomesh.io.formats.threemf.properties import MATERIAL, OBJECT, TEXTURES, Properties
-from anisomesh.io.formats.threemf.resources import CORE, NONE, Resources, number
+from anisomesh.io.formats.threemf.resources import CORE, NONE, Resources, number, reals, wholes
+from anisomesh.io.formats.threemf.triangle_sets import TRIANGLE_SETS, SetsOfObjects, TriangleSet, take
 from anisomesh.io.formats.units import OF_3MF
 from anisomesh.io.polygons import Integers, PolygonSoup
 
 ROOT = "3D/3dmodel.model"
 MODEL_TYPE = "http://schemas.microsoft.com/3dmanufacturing/2013/01/3dmodel"
 _SHAPES = {"beamlattice", "booleanshape", "levelset"}
+_ENTRIES = tuple(f"m{row}{column}" for row in range(4) for column in range(3))  # of a transformation
 _DEEPEST_COMPONENTS = 100
 _MAX_OBJECTS = 100_000
 _LARGEST_SHARE = 1_100  # uncompressed bytes per byte of an entry; zlib reaches 1,032
@@ -42,6 +45,7 @@ class _Object:
     properties: array[int] = field(default_factory=lambda: array("q"))  # group and three members, of each triangle
     default: tuple[int, int] = (NONE, NONE)  # group and member of triangles without
     components: list[tuple[tuple[str, str], str]] = field(default_factory=list)
+    sets: list[TriangleSet] = field(default_factory=list)
 
 
 @dataclass
@@ -87,7 +91,7 @@ class _Build:
         self._built: set[tuple[str, str]] = set()
         self._empty: list[str] = []  # names of objects without triangles
         self._n_points = self._n_instances = 0
-        self._properties = Properties()
+        self._properties, self._sets = Properties(), SetsOfObjects()
 
     def model(self, name: str) -> _Model:
         """Return a part of the archive; ValueError if it is missing or malformed."""
@@ -120,6 +124,7 @@ class _Build:
             is_reflected = bool(np.linalg.det(matrix[:3]) < 0.0)
             resources = self.model(key[0]).resources
             self._properties.add(found.name, given, found.default, resources, turned=is_reflected)
+            self._sets.add(found.sets, len(faces))
             if is_reflected:
                 faces = faces[:, ::-1]  # a reflection turns triangles inside out
             self.cells.add("triangle", faces + self._n_points)
@@ -143,6 +148,7 @@ class _Build:
         for path, label in self._properties.carry(carried).items():
             with carried.optional(f"the image of the texture {path!r}"):
                 carried.materials[TEXTURES][label]["data"] = _entry(self._archive, path)
+        self._sets.carry(carried)
         carried.materials[UNIT] = self.model(self.root).unit
         others = sorted(self.ignored - _SHAPES)
         if others:
@@ -171,25 +177,28 @@ def _entry(archive: zipfile.ZipFile, name: str) -> bytes:
 
 
 def _parse_model(text: bytes, name: str) -> _Model:
-    model, current = _Model(), _Object()
+    model, current, namespaces = _Model(), _Object(), dict[str, str]()
 
     def start(tag: str, attributes: dict[str, str]) -> None:
         nonlocal current
         namespace, _, local = tag.rpartition(" ")
-        if namespace != CORE:
+        if namespace == TRIANGLE_SETS:
+            take(current.sets, local, attributes)
+        elif namespace != CORE:
             model.resources.take(namespace, local, attributes)
             if local in _SHAPES:
                 model.ignored.add(local)
         elif local == "vertex":
-            current.points.extend((float(attributes["x"]), float(attributes["y"]), float(attributes["z"])))
+            current.points.extend(reals(attributes, "x", "y", "z"))
         elif local == "triangle":
-            current.faces.extend((int(attributes["v1"]), int(attributes["v2"]), int(attributes["v3"])))
+            current.faces.extend(wholes(attributes, "v1", "v2", "v3"))
             current.properties.extend(number(attributes.get(key, "")) for key in ("pid", "p1", "p2", "p3"))
         elif local == "object":
             current = model.objects.setdefault(attributes["id"], _Object())
             current.name = attributes.get("name", "")
             current.default = (number(attributes.get("pid", "")), number(attributes.get("pindex", "")))
         elif local == "model":
+            check_required(attributes.get("requiredextensions", ""), namespaces)
             model.unit = attributes.get("unit", model.unit)
         elif local in ("component", "item"):
             path = next((value for key, value in attributes.items() if key.endswith(" path")), "")
@@ -200,12 +209,15 @@ def _parse_model(text: bytes, name: str) -> _Model:
 
     parser = expat.ParserCreate(namespace_separator=" ")
     parser.StartElementHandler = start
+    parser.StartNamespaceDeclHandler = lambda prefix, uri: namespaces.setdefault(prefix or "", uri or "")
     try:
         parser.Parse(text, True)
     except expat.ExpatError as error:
         raise ValueError(f"truncated or malformed: {name}: {error}") from None
     except KeyError as error:
         raise ValueError(f"malformed: {name}: line {parser.CurrentLineNumber} lacks the attribute {error}") from None
+    except ValueError as error:
+        raise ValueError(f"{name}: line {parser.CurrentLineNumber}: {error}") from None
     return model
 
 
@@ -216,7 +228,8 @@ def _matrix(text: str) -> npt.NDArray[np.float64]:
     words = text.split()
     if len(words) != 12:
         raise ValueError(f"malformed: a transformation has {len(words)} numbers; expected 12")
-    return np.array(list(map(float, words)), dtype=np.float64).reshape(4, 3)
+    numbers = reals(dict(zip(_ENTRIES, words, strict=True)), *_ENTRIES)
+    return np.array(numbers, dtype=np.float64).reshape(4, 3)
 
 
 def _product(first: npt.NDArray[np.float64], then: npt.NDArray[np.float64]) -> npt.NDArray[np.float64]:

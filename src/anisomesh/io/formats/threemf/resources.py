@@ -6,6 +6,7 @@ Format: https://github.com/3MFConsortium/spec_materials/blob/master/3MF%20Materi
 from __future__ import annotations
 
 from array import array
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 
 import numpy as np
@@ -22,11 +23,36 @@ TEXTURE_ATTRIBUTES = ("contenttype", "tilestyleu", "tilestylev", "filter")
 """What a texture says besides its number and the part of the archive with its image."""
 
 _LEFT_OUT = {"compositematerials", "multiproperties"}
+_LARGEST, _LONGEST = 2**62, 20  # integers; characters of a text in a message
 
 
 def number(text: str) -> int:
     """Return the number of a group or a member, :data:`NONE` for other text."""
     return int(text) if text.isdecimal() and len(text) < 18 else NONE
+
+
+def reals(attributes: Mapping[str, str], *keys: str) -> list[float]:
+    """Return attributes that are real numbers; KeyError if one is missing, ValueError if it is not a number."""
+    try:
+        return [float(attributes[key]) for key in keys]
+    except ValueError:
+        raise ValueError(_wrong(attributes, keys, "numbers")) from None
+
+
+def wholes(attributes: Mapping[str, str], *keys: str) -> list[int]:
+    """Return attributes that are integers; KeyError if one is missing, ValueError if it is not an integer."""
+    try:
+        found = [int(attributes[key]) for key in keys]
+    except ValueError:
+        raise ValueError(_wrong(attributes, keys, "integers")) from None
+    if max(map(abs, found)) > _LARGEST:
+        raise ValueError(_wrong(attributes, keys, "smaller integers"))
+    return found
+
+
+def _wrong(attributes: Mapping[str, str], keys: Sequence[str], expected: str) -> str:
+    given = " ".join(f"{key}={attributes[key][:_LONGEST]!r}" for key in keys)
+    return f"it reads {given}; expected {expected}"
 
 
 @dataclass
@@ -90,6 +116,6 @@ class Resources:
             self._group = own
             self.texture_groups[own] = TextureGroup(number(attributes.get("texid", "")))
         elif element == "tex2coord" and self._group in self.texture_groups:
-            self.texture_groups[self._group].numbers.extend((float(attributes["u"]), float(attributes["v"])))
+            self.texture_groups[self._group].numbers.extend(reals(attributes, "u", "v"))
         elif element in _LEFT_OUT:
             self.ignored.add(element)

@@ -123,10 +123,8 @@ class Pieces:
         for name, values in self._cell_data.all(carried).items():
             carried.add_data_of_all_cells(name, values, [of.get(name) for of in names])
             if name in self._cell_data.of_marks:
-                divided = name in carried.lines.divisions or name in carried.fixed_points.divisions
                 carried.divisions.pop(name, None)
-                if carried.cell_data.pop(name, None) is not None and not divided:
-                    carried.remarks.append(f"left out CellData {name!r} of lines and vertices")
+                carried.cell_data.pop(name, None)
         for count, what in ((self._n_copies, "ghosts, which are copies of others"), (self._n_hidden, "hidden")):
             remarks += (f"left out {count} cell(s) marked as {what}",) if count else ()
         soup = self._cells.soup(np.concatenate(self._points), remarks, carried)
