@@ -110,6 +110,7 @@ def losses_of_attributes(before: Mesh, after: Mesh) -> Iterator[str]:
         yield f"point data with different values at coincident points are corner data of the result: {names}"
     yield from _shrunk_regions(before, after)
     yield from _lost_curves(before, after)
+    yield from _shorter_lines(before, after)
     used = before.fixed_points[np.isin(before.fixed_points, before.surface.faces)]
     unused = len(np.unique(before.fixed_points)) - len(np.unique(used))
     if unused:
@@ -149,6 +150,19 @@ def _lost_curves(before: Mesh, after: Mesh) -> Iterator[str]:
     if lost:
         more = f" and {len(lost) - _MAX_NAMED:,} more" if len(lost) > _MAX_NAMED else ""
         yield f"no edges follow the lines {', '.join(lost[:_MAX_NAMED])}{more}; ask for more vertices"
+
+
+def _shorter_lines(before: Mesh, after: Mesh) -> Iterator[str]:
+    """Yield a sentence if a considerable part of the prescribed edges has no edges of the result along it."""
+    old, new = (_length(mesh) for mesh in (before, after))
+    if new < (1.0 - _SHRUNK_SHARE) * old:
+        yield f"edges along prescribed lines are shorter in all ({new / old - 1.0:+.0%}); ask for more vertices"
+
+
+def _length(mesh: Mesh) -> float:
+    """Return the length of the features of a mesh, each counted once."""
+    ends = mesh.surface.points[np.unique(np.sort(mesh.features, axis=1), axis=0)]
+    return float(np.linalg.norm(ends[:, 1] - ends[:, 0], axis=1).sum())
 
 
 def caveats(

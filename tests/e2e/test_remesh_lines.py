@@ -145,3 +145,13 @@ def test_a_curve_that_no_edge_follows_is_named():
     mesh = plate()
     warnings = list(losses_of_attributes(mesh, Mesh(surface=mesh.surface)))
     assert "no edges follow the lines inlet, outlet, physical 8; ask for more vertices" in warnings
+
+
+@pytest.mark.parametrize(("lost", "is_said"), [(1, False), (6, True)])
+def test_lines_of_which_a_part_is_lost_are_said_to_be_shorter(lost, is_said):
+    mesh = plate()
+    assert len(mesh.features) > 20
+    after = Mesh(surface=mesh.surface, features=mesh.features[lost:])
+    told = [warning for warning in losses_of_attributes(mesh, after) if "shorter" in warning]
+    assert bool(told) == is_said
+    assert all("edges along prescribed lines are shorter in all (-" in warning for warning in told)

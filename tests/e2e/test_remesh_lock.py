@@ -199,6 +199,21 @@ def test_a_curved_border_of_locked_faces_is_not_cut_short(n_vertices):
     assert thickness(surface.points[surface.faces[free]]).min() > 0.03
 
 
+@pytest.mark.parametrize("n_vertices", [90, 120])
+def test_a_line_through_the_corner_of_a_locked_face_is_one_path(n_vertices):
+    surface = open_patch(lambda x, y: 0.1 * np.sin(3.0 * x), n=12)
+    row = np.flatnonzero(np.abs(surface.points[:, 1]) < 1e-9)
+    row = row[np.argsort(surface.points[row, 0])]
+    touching = np.flatnonzero((surface.faces == row[2]).any(axis=1) & ~np.isin(surface.faces, row[[1, 3]]).any(axis=1))
+    assert len(touching) > 0
+    line = np.stack([row[:-1], row[1:]], axis=1)
+    result = anisomesh.remesh(Mesh(surface=surface, features=line, fixed_faces=touching[:1]), n_vertices=n_vertices)
+    ends = result.surface.points[result.mesh.features]
+    assert (np.abs(ends[..., 1]) < 1e-9).all()
+    assert np.abs(np.diff(ends[..., 0], axis=1)).sum() == pytest.approx(np.ptp(surface.points[row, 0]), abs=1e-9)
+    assert result.warnings == ()
+
+
 def test_too_few_vertices_are_refused():
     with pytest.raises(
         OptionError, match=r"50 vertices are asked for, and the locked regions and points to keep have 81"

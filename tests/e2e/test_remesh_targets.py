@@ -280,6 +280,20 @@ def test_a_time_limit_ends_the_search_with_the_best_result_so_far():
         smallest_within(run, surface, 0.2, Deadline())
 
 
+@pytest.mark.parametrize(("n", "most"), [(170, 2_000), (30, 96)])
+def test_a_search_begins_with_few_vertices_also_on_a_dense_surface(n, most):
+    """Regression: on 393,216 points it began with 39,322 vertices, for which the input is not reduced."""
+    tried = []
+
+    def run(n):
+        tried.append(n)
+        raise TimeLimitError("over")
+
+    with pytest.raises(TimeLimitError):
+        smallest_within(run, open_patch(lambda x, y: 0.0 * x, n=n), 0.2, Deadline())
+    assert tried == [most]
+
+
 def test_one_of_the_ways_to_ask_is_wanted():
     for asked in ({}, {"n_vertices": 9, "max_error": 0.1}, {"ratio": 0.1, "max_error": 0.1}):
         with pytest.raises(AnisomeshError, match="one of n_vertices, ratio, max_error and edge_length"):

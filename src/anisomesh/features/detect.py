@@ -39,7 +39,8 @@ def share_of_flat_edges(surface: Surface) -> float:
 def corners(surface: Surface, sharp: EdgeMask) -> PointMask:
     """Return which points (V,) are corners of the sharp edges (E,).
 
-    A corner is the end of one sharp edge, of more than two, or of two that turn by 45 degrees or more.
+    A corner is the end of one sharp edge, of more than two, or of two that turn by 45 degrees or more, and any point
+    where a sharp edge comes to the boundary from inside.
     """
     ends = surface.edges[sharp]
     along = geometry.unit(surface.points[ends[:, 1]] - surface.points[ends[:, 0]])
@@ -48,7 +49,9 @@ def corners(surface: Surface, sharp: EdgeMask) -> PointMask:
     np.add.at(outward, ends[:, 0], along)
     np.add.at(outward, ends[:, 1], -along)
     straight = (count == 2) & (np.linalg.norm(outward, axis=1) < 2.0 * np.sin(np.radians(_MIN_CORNER_TURN) / 2.0))
-    return np.asarray((count > 0) & ~straight)
+    reached = np.zeros(surface.n_points, dtype=bool)
+    reached[surface.edges[sharp & (surface.edge_face_count > 1)]] = True
+    return np.asarray((count > 0) & ~(straight & ~(reached & surface.on_boundary)))
 
 
 def apexes(surface: Surface, sharp: EdgeMask) -> PointMask:
