@@ -2,6 +2,7 @@
 
 import json
 import os
+import signal
 from pathlib import Path
 
 import pytest
@@ -14,6 +15,7 @@ from anisomesh.batch.manifest import read_manifest
 from anisomesh.batch.options import plain_options
 from anisomesh.batch.rows import Results
 from anisomesh.batch.running import Batch
+from anisomesh.cli.ending import exit_at_sigterm
 from anisomesh.errors import AnisomeshError, OptionError
 from anisomesh.execution.engine import Work
 from conftest import torus_arrays, write_obj
@@ -261,3 +263,21 @@ def test_file_systems_without_locks_are_said(folder, monkeypatch, caplog):
     monkeypatch.setattr("fcntl.flock", refuse)
     with at_work(folder, None):
         assert "its file system has no locks" in caplog.text
+
+
+@pytest.mark.skipif(os.name == "nt", reason="signals")
+def test_sigterm_ends_a_batch_as_an_exit_which_ends_its_workers(run_cli, folder, monkeypatch):
+    """Regression: the process ended alone, and what it shared with its workers was left for others to clean up."""
+    ended, before = [], signal.getsignal(signal.SIGTERM)
+
+    def batch_of(*_):
+        try:
+            os.kill(os.getpid(), signal.SIGTERM)
+        finally:
+            ended.append(True)
+
+    monkeypatch.setattr("anisomesh.batch.running.Batch.run", batch_of)
+    with exit_at_sigterm(), pytest.raises(SystemExit) as error:  # else a fault would end the tests
+        run_cli("batch", "a.obj", "-n", 30, "-o", "out", "--workers", 0, "--no-thumbnails", cwd=folder)
+    assert (error.value.code, ended) == (143, [True])
+    assert signal.getsignal(signal.SIGTERM) is before

@@ -25,6 +25,7 @@ from anisomesh.cli.arguments import (
     takes_remesh_options,
     target_option,
 )
+from anisomesh.cli.ending import exit_at_sigterm
 from anisomesh.cli.inputs import check_present
 from anisomesh.cli.job import check_format
 from anisomesh.cli.progress import Display, announce_compilation, progress
@@ -185,7 +186,7 @@ def _run(jobs: list[Job], folder: Path, settings: Settings, quiet: bool) -> None
 
     start = time.monotonic()
     batch = Batch(jobs, folder, settings)
-    with progress(quiet) as display:
+    with exit_at_sigterm(), progress(quiet) as display:
         if batch.left:
             _begin(display, batch)
         rows = batch.run(partial(_show, display, {job.output for job in jobs if job.place}))
