@@ -78,4 +78,7 @@ def whole_number(name: str, value: object, low: int) -> int:
 
 
 def _remedy(value: object) -> str:
-    return ", written without quotes" if isinstance(value, str) else ""
+    try:
+        return ", written without quotes" if isinstance(value, str) and math.isfinite(float(value)) else ""
+    except ValueError:
+        return ""

@@ -318,7 +318,7 @@ def test_a_mesh_may_be_the_name_of_a_file(ring, tmp_path):
         ({"colour": "red"}, "has no option 'colour'; expected one of n_vertices, ratio, max_error, sharpness, "),
         ({"n_vertices": "200"}, "n_vertices = '200'; expected a whole number of at least 4, written without quotes"),
         ({"ratio": "0.2"}, "ratio = '0.2'; expected a number, written without quotes"),
-        ({"n_vertices": 100, "seed": "a"}, "seed = 'a'; expected a whole number of at least 0, written without quotes"),
+        ({"n_vertices": 100, "seed": "a"}, "seed = 'a'; expected a whole number of at least 0$"),
     ],
 )
 def test_a_wrong_keyword_or_type_is_answered_with_what_was_meant(ring, given, words):

@@ -242,10 +242,10 @@ def test_a_row_replaces_the_metric_of_the_command_and_names_files_beside_the_man
 @pytest.mark.parametrize(
     ("name", "text", "message"),
     [
-        ("a.csv", "input,vertexes\na.obj,3\n", "line 2: unknown key 'vertexes'"),
+        ("a.csv", "input,vertexes\na.obj,3\n", "line 1: unknown key 'vertexes'"),
         ("a.csv", "input,ratio\na.obj\n", "line 2: expected 2 columns"),
         ("a.csv", "output\na.ply\n", "line 2: input is missing"),
-        ("a.csv", "input\n", "the table is empty"),
+        ("a.csv", "input\n", "no rows; expected a row for each mesh"),
         ("a.jsonl", '{"input": "a.obj"}\n{"input": "b.ob', "line 2: not JSON"),
         ("a.jsonl", '["a.obj"]\n', "line 1: expected an object"),
         ("a.jsonl", '{"input": 3}\n', "line 1: input is missing"),
@@ -479,7 +479,7 @@ def test_command_does_what_is_left_and_says_if_some_failed(run_cli, meshes, tmp_
         (["IN", "-n", 30, "--shard", "3/2"], 2, "--shard 3/2"),
         (["IN", "--max-error", "1mm"], 2, "expected a length"),
         (["IN", "-n", 30, "--output-format", "docx"], 2, "docx"),
-        (["IN", "-n", 30, "--ratio", 0.5], 1, "give one of --vertices, --ratio"),
+        (["IN", "-n", 30, "--ratio", 0.5], 2, "-n and --ratio are given; give one of -n"),
         (["IN/no.obj", "-n", 30], 1, "no such file"),
     ],
 )

@@ -7,7 +7,7 @@ from collections.abc import Sequence
 from pathlib import Path, PurePosixPath
 
 from anisomesh.batch.jobs import Job
-from anisomesh.batch.options import Options
+from anisomesh.batch.options import Options, plain_options
 from anisomesh.batch.places import absolute, files_below, is_address, suffix_of
 from anisomesh.errors import OptionError, why_unreadable
 from anisomesh.io.known_formats import MESH_FORMATS
@@ -32,28 +32,34 @@ def jobs_of(
     Returns
     -------
     jobs
-        Each mesh once. The output has the name of the input, and keeps the folders below the one that was named, or
-        below the part of a pattern before its first ``*``.
+        Each mesh once, however often and by whatever path it is named. The output has the name of the input, and keeps
+        the folders below the one that was named, or below the part of a pattern before its first ``*``. Files and
+        folders below it whose names begin with a point are left out; links that lead nowhere are not.
 
     Raises
     ------
     OptionError
-        If a file, folder or pattern has no mesh.
+        If a file, folder or pattern has no mesh, or an option is unknown or out of range.
     """
-    found: dict[str, str] = {}
-    for name in names:
-        for path, relative in _meshes(name, without):
-            found.setdefault(path, relative)
-    return [
-        Job(input=path, output=in_format(relative, output_format), options=options) for path, relative in found.items()
-    ]
+    if names:
+        plain_options(options, "")  # the first job would be blamed for what is wrong in all
+    found: list[Job] = []
+    seen: set[tuple[str, ...]] = set()
+    for path, relative in (mesh for name in names for mesh in _meshes(name, without)):
+        output = in_format(relative, output_format)
+        real = path if is_address(path) else str(Path(path).parent.resolve() / Path(path).name)
+        same = {(path,), (real, output)}
+        if seen.isdisjoint(same):
+            found.append(Job(input=path, output=output, options=options))
+        seen |= same
+    return found
 
 
 def _meshes(name: str, without: Path | None) -> list[tuple[str, str]]:
     """Return the meshes that are meant by a name, each with its path below the folder that was named."""
     if is_address(name):
         return _addresses(name)
-    path = Path(absolute(name))
+    path = _without_steps_up(Path(absolute(name)))
     if path.is_file():
         return [(str(path), path.name)]
     if path.is_dir():
@@ -66,7 +72,7 @@ def _meshes(name: str, without: Path | None) -> list[tuple[str, str]]:
             f"{name}: {why_unreadable(path, FileNotFoundError())}; expected a mesh, a folder or a pattern"
         )
     hidden = None if without is None else without.resolve()
-    meshes = [p for p in paths if p.suffix.lower() in MESH_FORMATS and p.is_file() and not _is_hidden(p, base)]
+    meshes = [p for p in paths if p.suffix.lower() in MESH_FORMATS and _is_file(p) and not _is_hidden(p, base)]
     meshes = [p for p in meshes if hidden is None or hidden not in p.resolve().parents]
     if not meshes:
         raise OptionError(f"{name}: no meshes found; expected files ending in {', '.join(sorted(MESH_FORMATS))}")
@@ -78,10 +84,23 @@ def _addresses(name: str) -> list[tuple[str, str]]:
     if files is None:
         return [(name, Path(name).name)]
     base = name.partition("*")[0].rpartition("/")[0] if "*" in name else name.rstrip("/")
-    meshes = [file for file in files if suffix_of(file) in MESH_FORMATS]
+    found = [(file, file.removeprefix(base).lstrip("/")) for file in files if suffix_of(file) in MESH_FORMATS]
+    meshes = [(file, below) for file, below in found if not _is_hidden(Path(file), Path(base))]
     if not meshes:
         raise OptionError(f"{name}: no meshes found; expected files ending in {', '.join(sorted(MESH_FORMATS))}")
-    return [(file, file.removeprefix(base).lstrip("/")) for file in meshes]
+    return meshes
+
+
+def _without_steps_up(path: Path) -> Path:
+    """Return an absolute path without ``..``, so that a mesh that is named twice has one path."""
+    if ".." not in path.parts or glob.has_magic(str(path.parent)):
+        return path
+    return path.resolve() if path.name == ".." else path.parent.resolve() / path.name
+
+
+def _is_file(path: Path) -> bool:
+    """Return whether a path is a file, or a link that leads nowhere, of which a row is to say so."""
+    return path.is_file() or (path.is_symlink() and not path.exists())
 
 
 def _fixed_part(pattern: Path) -> Path:

@@ -30,11 +30,14 @@ class Job:
         ``ratios`` for levels of detail, ``max_error`` or ``edge_length`` (also ``"0.1%"`` of the diagonal), and others;
         of ``features``, ``keep_points`` and ``density`` the names of text files. ``metric_file``, ``adapt_to`` and
         ``norm`` are as on the command line.
+    place
+        Where the job is written, such as a line of a manifest, for messages; empty if nowhere.
     """
 
     input: str
     output: str
     options: Options = field(default_factory=dict)
+    place: str = field(default="", compare=False)
 
     @property
     def outputs(self) -> list[str]:
@@ -76,7 +79,12 @@ def checked(jobs: Sequence[Job], folder: str) -> list[Job]:
     if not jobs:
         raise OptionError("no meshes were given; name files, folders or a manifest")
     found = [_in_one_form(job) for job in jobs]
-    missing = [path for job in found for path in job.files.values() if not is_address(path) and not exists(path)]
+    missing = [
+        _placed(path, job)
+        for job in found
+        for name, path in job.files.items()
+        if _is_missing(path, is_input=name == "input")
+    ]
     if missing:
         more = f", and {len(missing) - _MISSING_SHOWN:,} more" if len(missing) > _MISSING_SHOWN else ""
         raise OptionError(f"no such file: {', '.join(missing[:_MISSING_SHOWN])}{more}")
@@ -84,8 +92,17 @@ def checked(jobs: Sequence[Job], folder: str) -> list[Job]:
     return found
 
 
+def _is_missing(path: str, *, is_input: bool) -> bool:
+    """Return whether a file is not there; an input that is a link to one which is not will be a row that says so."""
+    return not (is_address(path) or exists(path) or (is_input and Path(path).is_symlink()))
+
+
+def _placed(name: str, job: Job) -> str:
+    return f"{name} ({job.place})" if job.place else name
+
+
 def _in_one_form(job: Job) -> Job:
-    where = f"the job for {job.input}"
+    where = job.place or f"the job for {job.input}"
     for place in (job.input, job.output):
         if suffix_of(place) not in MESH_FORMATS:
             expected = ", ".join(sorted(MESH_FORMATS))
@@ -105,12 +122,14 @@ def _check_outputs(jobs: Sequence[Job], folder: str) -> None:
         for name in job.outputs:
             output = _identity(joined(folder, name))
             if output in inputs:
-                raise OptionError(f"{name} is an input and would be overwritten; choose another folder or name")
+                named = _placed(name, job)
+                raise OptionError(f"{named} is an input and would be overwritten; choose another folder or name")
             first = writers.setdefault(output, job)
             if first is not job:
+                how = "" if first.place and job.place else ", in a manifest, or name a folder that contains both"
                 raise OptionError(
-                    f"{first.input} and {job.input} would both be written to {name}; give them outputs of their "
-                    "own, in a manifest, or name a folder that contains both"
+                    f"{_placed(first.input, first)} and {_placed(job.input, job)} would both be written to {name}; "
+                    f"give them outputs of their own{how}"
                 )
 
 

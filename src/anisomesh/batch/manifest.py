@@ -3,21 +3,24 @@
 from __future__ import annotations
 
 import csv
+import io
 import json
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
+from functools import partial
 from pathlib import Path
 from typing import Any
 
 from anisomesh.batch.inputs import in_format
 from anisomesh.batch.jobs import Job
 from anisomesh.batch.options import FIELDS, METRICS, OPTION_NAMES, TABLES, TARGETS, Options, file_and_field
-from anisomesh.batch.places import is_address, joined
+from anisomesh.batch.places import exists, is_address, joined
 from anisomesh.errors import OptionError, why_unreadable
 from anisomesh.toml import check_keys
 
 _KNOWN_COLUMNS = ("input", "output", *OPTION_NAMES)
 _WORDS = {"true": True, "false": False, "yes": True, "no": False}
 _TEXTS = ("input", "output", "weights", "lock", *TABLES, *FIELDS)
+_OTHER_SEPARATORS = {";": "semicolons", "\t": "tabs", "|": "bars"}
 
 
 def read_manifest(path: Path, options: Options, *, output_format: str | None = None) -> list[Job]:
@@ -38,7 +41,7 @@ def read_manifest(path: Path, options: Options, *, output_format: str | None = N
     Raises
     ------
     OptionError
-        If the file cannot be read, has another suffix, a column is unknown, or a row has no input.
+        If the file cannot be read, has another suffix, a column is unknown or given twice, or a row has no input.
     """
     readers = {".jsonl": _json_rows, ".csv": _csv_rows}
     if path.suffix.lower() not in readers:
@@ -54,7 +57,7 @@ def read_manifest(path: Path, options: Options, *, output_format: str | None = N
         check_keys(where, row, _KNOWN_COLUMNS)
         jobs.append(_job(where, row, options, path.parent, output_format))
     if not jobs:
-        raise OptionError(f"{path}: the table is empty; expected one for each mesh")
+        raise OptionError(f"{path}: there are no rows; expected a row for each mesh")
     return jobs
 
 
@@ -70,12 +73,22 @@ def _job(where: str, row: dict[str, Any], options: Options, folder: Path, output
         output = in_format(Path(source).name if is_elsewhere else _below(source), output_format)
     replaced = {name for group in (TARGETS, METRICS) if any(name in given for name in group) for name in group}
     base = {name: value for name, value in options.items() if name not in replaced}
-    given |= {name: joined(str(folder), str(given[name])) for name in TABLES if name in given}
+    return Job(
+        input=joined(str(folder), source), output=output, options=base | _beside(str(folder), given), place=where
+    )
+
+
+def _beside(folder: str, given: Options) -> Options:
+    """Return the options of a row with the files that they name in the folder of the manifest."""
+    texts = {name: value for name, value in given.items() if isinstance(value, str)}  # others are refused later
+    found = {name: joined(folder, texts[name]) for name in TABLES if name in texts}
     for name in FIELDS:
-        if name in given:
-            file, field = file_and_field(name, str(given[name]))
-            given[name] = field if file is None else joined(str(folder), file) + field
-    return Job(input=joined(str(folder), source), output=output, options=base | given)
+        if name in texts:
+            file, field = file_and_field(name, texts[name])
+            found[name] = field if file is None else joined(folder, file) + field
+    if "weights" in texts and exists(network := joined(folder, texts["weights"])):  # else the name of a network
+        found["weights"] = network
+    return given | found
 
 
 def _below(source: str) -> str:
@@ -84,27 +97,58 @@ def _below(source: str) -> str:
 
 
 def _json_rows(name: str, text: str) -> Iterator[tuple[str, dict[str, Any]]]:
-    for number, line in enumerate(text.splitlines(), 1):
+    for number, line in enumerate(text.split("\n"), 1):
         if line.strip():
+            where = f"{name}, line {number}"
             try:
-                row = json.loads(line)
-            except json.JSONDecodeError as error:
-                raise OptionError(f"{name}, line {number}: not JSON: {error}") from error
+                row = json.loads(line, object_pairs_hook=partial(_object, where))
+            except OptionError:
+                raise
+            except (ValueError, RecursionError) as error:  # also a number of too many digits
+                raise OptionError(f"{where}: not JSON: {error}") from error
             if not isinstance(row, dict):
-                raise OptionError(f'{name}, line {number}: expected an object such as {{"input": "part.ply"}}')
-            yield f"{name}, line {number}", row
+                raise OptionError(f'{where}: expected an object such as {{"input": "part.ply"}}')
+            yield where, row
+
+
+def _object(where: str, pairs: list[tuple[str, Any]]) -> dict[str, Any]:
+    _check_once(where, [name for name, _ in pairs])
+    return dict(pairs)
 
 
 def _csv_rows(name: str, text: str) -> Iterator[tuple[str, dict[str, Any]]]:
-    reader = csv.DictReader(text.splitlines(), skipinitialspace=True, strict=True)
+    reader = csv.reader(io.StringIO(text), skipinitialspace=True, strict=True)
+    heading: list[str] = []
     try:
-        for row in reader:
+        for cells in filter(None, reader):
             where = f"{name}, line {reader.line_num}"
-            if None in row or None in row.values():
-                raise OptionError(f"{where}: expected {len(reader.fieldnames or ())} columns, as in the heading")
-            yield where, {key: _value(key, text.strip()) for key, text in row.items()}
+            if not heading:
+                heading = _heading(where, cells)
+                continue
+            if len(cells) != len(heading):
+                raise OptionError(f"{where}: expected {len(heading)} columns, as in the heading; found {len(cells)}")
+            yield where, {column: _value(column, cell.strip()) for column, cell in zip(heading, cells, strict=True)}
     except csv.Error as error:
         raise OptionError(f"{name}, line {reader.line_num}: not CSV: {error}") from error
+
+
+def _heading(where: str, cells: Sequence[str]) -> list[str]:
+    """Return the names of the columns of a CSV file, after checking them."""
+    names = [cell.strip() for cell in cells]
+    for sign, words in _OTHER_SEPARATORS.items():
+        if len(names) == 1 and sign in names[0]:
+            raise OptionError(f"{where}: the columns are separated by {words}; expected commas")
+    if "" in names:
+        raise OptionError(f"{where}: column {names.index('') + 1} has no name; give it one, or leave it out")
+    _check_once(where, names)
+    check_keys(where, dict.fromkeys(names), _KNOWN_COLUMNS)
+    return names
+
+
+def _check_once(where: str, names: Sequence[str]) -> None:
+    for name in names:
+        if names.count(name) > 1:
+            raise OptionError(f"{where}: {name} is given twice")
 
 
 def _value(column: str, text: str) -> Any:

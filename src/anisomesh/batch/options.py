@@ -27,6 +27,7 @@ FIELDS = METRICS[1:]
 input."""
 _LIMITS = ("min_size", "max_size", "gradation")  # of the sizes in a metric_file
 _LENGTHS = ("max_error", "edge_length", "weld_tolerance", "min_size", "max_size")
+_WHOLE = ("n_vertices", *(field.name for field in fields(RemeshOptions) if field.type in ("int", "int | None")))
 _OBJECTS = ("energy", "size_field")  # without a form in a file of jobs
 _WITHOUT_EFFECT = ("threads",)  # on the result
 OPTION_NAMES = tuple(
@@ -48,7 +49,7 @@ def plain_options(options: Options, where: str) -> Options:
         Values by the keywords of :func:`anisomesh.pipeline.remesh`. Lengths may be texts such as ``"0.1%"`` of the
         diagonal, and a ratio ``"20%"``; features, keep_points and density are names of text files.
     where
-        The job, for messages.
+        The job, for messages; empty for options of many.
 
     Raises
     ------
@@ -60,7 +61,7 @@ def plain_options(options: Options, where: str) -> Options:
         read = {name: _read(name, value) for name, value in options.items() if value is not None}
         _check(read)
     except OptionError as error:
-        raise OptionError(f"{where}: {error}") from error
+        raise OptionError(f"{where}: {error}" if where else str(error)) from error
     default = RemeshOptions()
     return {name: value for name, value in read.items() if name in TARGETS or value != getattr(default, name, None)}
 
@@ -177,16 +178,18 @@ def _read(name: str, value: Any) -> Any:
         value = os.fspath(value)
     items = value if isinstance(value, list | tuple) else [value]
     is_name = name in (*TABLES, *FIELDS)
-    if not all(isinstance(item, str if is_name else str | int | float) for item in items):
+    if not (isinstance(value, str) if is_name else all(isinstance(item, str | int | float) for item in items)):
         kind = "text file" if name in TABLES else "file or field"
         expected = f"the name of a {kind}" if is_name else "a number, a text, true or false"
         raise OptionError(f"{name} is of type {type(value).__name__}; expected {expected}")
     if name == "ratios":
         words = value.replace(",", " ").split() if isinstance(value, str) else items
         return [_share(name, word) for word in words]
+    if name in (*_WHOLE, "lock"):  # a label of a region is whole too
+        return [_as_whole(item) for item in value] if isinstance(value, list | tuple) else _as_whole(value)
     if not isinstance(value, str) or is_name:
         return value
-    if name == "ratio" and value.endswith("%"):
+    if name == "ratio":
         return _share(name, value)
     if name in _LENGTHS and value != "auto" and not value.endswith("%"):
         return _length(name, value).value
@@ -197,8 +200,17 @@ def _length(name: str, text: str) -> Length:
     return Length.tolerance(text, name) if name == "weld_tolerance" else Length.parse(text, name)
 
 
+def _as_whole(value: Any) -> Any:
+    """Return a number such as 60.0, as programs write whole numbers of a column with gaps, as an int."""
+    return int(value) if isinstance(value, float) and value.is_integer() else value
+
+
 def _share(name: str, value: Any) -> Any:
     """Return a share, such as 0.2 or ``"20%"``, as a number."""
     if not isinstance(value, str):
         return value
-    return float(Length.parse(value, name).value) / (100.0 if value.endswith("%") else 1.0)
+    try:
+        number = float(value.removesuffix("%"))
+    except ValueError:
+        raise OptionError(f"{name} {value}: expected a share such as 0.2, or 20%") from None
+    return number / 100.0 if value.endswith("%") else number

@@ -44,6 +44,20 @@ def exists(place: str) -> bool:
     return _on(place, lambda fs, path: bool(fs.isfile(path))) if is_address(place) else Path(place).is_file()
 
 
+def make_folder(folder: Path) -> None:
+    """Make a folder of this machine and the ones above it, if they are missing.
+
+    Raises
+    ------
+    MeshFileError
+        If it cannot be made.
+    """
+    try:
+        folder.mkdir(parents=True, exist_ok=True)
+    except OSError as error:
+        raise MeshFileError(f"{folder}: cannot be made: {error.strerror or error}") from error
+
+
 def stamp_of(place: str) -> str:
     """Return what changes whenever a file does: its size and the time of its change, or what the file system tells.
 
@@ -57,7 +71,8 @@ def stamp_of(place: str) -> str:
     try:
         facts = Path(place).stat()
     except OSError as error:
-        raise MeshFileError(f"{place}: {why_unreadable(place, error)}") from error
+        link = f"a link to {Path(place).readlink()}: " if Path(place).is_symlink() else ""
+        raise MeshFileError(f"{place}: {link}{why_unreadable(place, error)}") from error
     return f"{facts.st_size} {facts.st_mtime_ns}"
 
 

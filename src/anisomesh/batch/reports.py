@@ -73,7 +73,7 @@ def _line(row: Row, folder: Path, outputs: str) -> list[str]:
     stretch = report.get("stretch", {})
     return [
         _picture(picture_of(folder, row["output"])),
-        _link(row["output"], folder, outputs) if row["status"] == "done" else row["output"],
+        _links(row, folder, outputs) if row["status"] == "done" else row["output"],
         row["status"],
         *(_shown(report.get(name), ",") for name in ("vertices", "faces")),
         *(_shown(stretch.get(name), ".2f") for name in ("mean", "max")),
@@ -88,6 +88,14 @@ def _picture(path: Path) -> Html:
     if not path.is_file():
         return Html("")
     return Html(f'<img alt="" src="data:image/png;base64,{base64.b64encode(path.read_bytes()).decode()}">')
+
+
+def _links(row: Row, folder: Path, outputs: str) -> str:
+    written = row.get("outputs", [row["output"]])  # rows of older versions have no list
+    links = [_link(output, folder, outputs) for output in written]
+    if not any(isinstance(link, Html) for link in links):
+        return " ".join(links)
+    return Html(" ".join(link if isinstance(link, Html) else escape(link) for link in links))
 
 
 def _link(output: str, folder: Path, outputs: str) -> str:

@@ -9,8 +9,8 @@ from typing import Any
 
 from anisomesh.batch.jobs import Job
 from anisomesh.batch.keys import facts_of_files, key_of
-from anisomesh.batch.places import exists, joined
-from anisomesh.errors import AnisomeshError, MeshFileError
+from anisomesh.batch.places import exists, joined, make_folder
+from anisomesh.errors import AnisomeshError
 from anisomesh.io.atomic import atomic_path
 from anisomesh.io.results.json_lines import append_line, as_line, drop_cut_line, finite, not_a_row, read_rows
 
@@ -34,10 +34,7 @@ class Results:
         self.folder = folder
         self.name = (_STEM if shard is None else f"{_STEM}.{shard[0]}-of-{shard[1]}") + _SUFFIX
         self.path = folder / self.name
-        try:
-            folder.mkdir(parents=True, exist_ok=True)
-        except OSError as error:
-            raise MeshFileError(f"{folder}: cannot be made: {error.strerror or error}") from error
+        make_folder(folder)
         drop_cut_line(self.path)
 
     def rows(self) -> dict[str, Row]:

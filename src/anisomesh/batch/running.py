@@ -4,13 +4,14 @@ from __future__ import annotations
 
 import time
 from collections.abc import Callable, Iterator, Sequence
-from contextlib import closing
+from contextlib import ExitStack, closing
 from dataclasses import dataclass, field
 from datetime import UTC, datetime
 from importlib.metadata import version
 from operator import attrgetter
 from pathlib import Path
 
+from anisomesh.batch.at_work import at_work
 from anisomesh.batch.jobs import Job, checked
 from anisomesh.batch.places import absolute, is_address, joined
 from anisomesh.batch.reports import PAGE, write_page, write_parquet
@@ -93,7 +94,12 @@ class Batch:
     OptionError
         See :func:`~anisomesh.batch.jobs.checked`.
     AnisomeshError
-        If a row of an earlier call cannot be read.
+        If a row of an earlier call cannot be read, or another batch is at work in the folder, see
+        :func:`~anisomesh.batch.at_work.at_work`.
+
+    Notes
+    -----
+    A batch has its folder for itself, beside other shards, from here to the end of :meth:`run`.
     """
 
     def __init__(self, jobs: Sequence[Job], folder: str | Path, settings: Settings | None = None) -> None:
@@ -102,9 +108,12 @@ class Batch:
         self._outputs = str(self.folder) if self.settings.outputs is None else absolute(self.settings.outputs)
         first, step = self.settings.shard or (1, 1)
         self.jobs = checked(jobs, self._outputs)[first - 1 :: step]
-        self.results = Results(self.folder, self.settings.shard)
-        self._rows = self.results.rows()
-        self.left = [job for job in self.jobs if not is_done(job, self._rows.get(job.output), self._outputs)]
+        with ExitStack() as held:
+            held.enter_context(at_work(self.folder, self.settings.shard))
+            self.results = Results(self.folder, self.settings.shard)
+            self._rows = self.results.rows()
+            self.left = [job for job in self.jobs if not is_done(job, self._rows.get(job.output), self._outputs)]
+            self._held = held.pop_all()
 
     def run(
         self,
@@ -124,16 +133,23 @@ class Batch:
         Returns
         -------
         rows
-            With the keys ``input``, ``output``, ``key``, ``status`` (``done``; ``refused`` if anisomesh said in
-            ``error`` why it cannot be done; ``failed`` for other errors, and if the worker ended in each of three
-            tries), ``seconds``, ``tries``, ``options``, ``version``, ``finished``, ``report`` as of
-            :meth:`~anisomesh.result.RemeshResult.report`, and ``log``, what readers and writers warned of.
+            With the keys ``input``, ``output``, ``outputs`` (the meshes that were written, several for levels of
+            detail), ``key``, ``status`` (``done``; ``refused`` if anisomesh said in ``error`` why it cannot be done;
+            ``failed`` for other errors, and if the worker ended in each of three tries), ``seconds``, ``tries``,
+            ``options``, ``version``, ``finished``, ``report`` as of :meth:`~anisomesh.result.RemeshResult.report`, with
+            one of each of the ``levels`` if there are any, and ``log``, what readers and writers warned of.
 
         Raises
         ------
         AnisomeshError
             If the cluster is lost.
         """
+        with self._held:
+            self._do_what_is_left(on_row, work)
+        return [self._rows[job.output] for job in self.jobs]
+
+    def _do_what_is_left(self, on_row: Callable[[Progress], None], work: Work) -> None:
+        """Hand the jobs that are left to the workers, keep their rows, and write the reports."""
         tasks = [self._task(job) for job in self.left]
         self.results.forget([job.output for job in self.left])
         targets = [joined(self._outputs, name) for job in self.left for name in job.outputs]
@@ -147,7 +163,6 @@ class Batch:
             rows = list(self.results.rows().values())
             write_page(rows, self.folder, self._outputs)
             write_parquet(rows, self.folder)
-        return [self._rows[job.output] for job in self.jobs]
 
     def _keep(self, outcomes: Iterator[Outcome], on_row: Callable[[Progress], None]) -> None:
         """Add a row for every outcome, and tell of it."""
@@ -206,4 +221,6 @@ def _row(job: Job, outcome: Outcome) -> Row:
     known = {"input": job.input, "output": job.output, "options": job.options, "version": version("anisomesh")}
     lost: Row = {"status": "failed", "error": outcome.error, "key": None, "files": {}, "seconds": None}
     finished = datetime.now(UTC).isoformat(timespec="milliseconds")
-    return {**known, **(outcome.result or lost), "tries": outcome.tries, "finished": finished}
+    result = outcome.result or lost
+    known["outputs"] = job.outputs if result["status"] == "done" else []
+    return {**known, **result, "tries": outcome.tries, "finished": finished}

@@ -25,6 +25,7 @@ from anisomesh.cli.arguments import (
     takes_remesh_options,
     target_option,
 )
+from anisomesh.cli.ending import exit_at_sigterm
 from anisomesh.cli.inputs import check_present
 from anisomesh.cli.job import check_format
 from anisomesh.cli.progress import Display, announce_compilation, progress
@@ -39,7 +40,7 @@ from anisomesh.cli.remeshing.shared_options import (
     NormOfAdaption,
     Ratios,
 )
-from anisomesh.cli.spelling import as_options
+from anisomesh.cli.spelling import as_options, spelled
 from anisomesh.options import MAX_THREADS
 
 if TYPE_CHECKING:
@@ -148,8 +149,9 @@ def _jobs(
 
     if not sources and manifest is None:
         raise typer.BadParameter("name meshes, folders or patterns, or a --manifest")
-    if not options.keys() & {*TARGETS, "metric_file"} and sources:
-        check_targets({}, None, options.get("adapt_to"))
+    targets = {spelled(name): options[name] for name in TARGETS if name in options}
+    if sources or len(targets) > 1:
+        check_targets(targets, options.get("metric_file"), options.get("adapt_to"))
     check_present(manifest, *(Path(name) for name in sources if not is_address(name) and not glob.has_magic(name)))
     listed = [] if manifest is None else read_manifest(manifest, options, output_format=output_format)
     return [*listed, *jobs_of(sources, options, output_format=output_format, without=out)]
@@ -184,10 +186,10 @@ def _run(jobs: list[Job], folder: Path, settings: Settings, quiet: bool) -> None
 
     start = time.monotonic()
     batch = Batch(jobs, folder, settings)
-    with progress(quiet) as display:
+    with exit_at_sigterm(), progress(quiet) as display:
         if batch.left:
             _begin(display, batch)
-        rows = batch.run(partial(_show, display))
+        rows = batch.run(partial(_show, display, {job.output for job in jobs if job.place}))
     counts = Counter(row["status"] for row in rows)
     if not quiet:
         said = ", ".join(f"{counts[status]:,} {status}" for status in STATUSES if counts[status])
@@ -214,12 +216,16 @@ def _begin(display: Display, batch: Batch) -> None:
     announce_compilation(display, "remesh", "fit")
 
 
-def _show(display: Display, step: Progress) -> None:
-    """Show how many jobs have ended, the time left, and what became of a job unless it is done."""
+def _show(display: Display, listed: set[str], step: Progress) -> None:
+    """Show how many jobs have ended, the time left, and what became of a job unless it is done.
+
+    Options of jobs whose outputs are ``listed`` in a manifest are called as there.
+    """
     from anisomesh.execution.progress import StepInfo
 
     row = step.row
     if row["status"] != "done":
-        display.note(f"{row['status']}: {row['output']}: {as_options(' '.join(row['error'].split()))}")
+        error = " ".join(row["error"].split())
+        display.note(f"{row['status']}: {row['output']}: {error if row['output'] in listed else as_options(error)}")
     left = f"{step.seconds_left / 60:.0f} min left" if step.seconds_left >= 60 else f"{step.seconds_left:.0f} s left"
     display(StepInfo(stage="batch", iteration=step.number, total=step.total, message=left))

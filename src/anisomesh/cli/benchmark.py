@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from anisomesh.cli.arguments import share
+from anisomesh.cli.ending import exit_at_sigterm
 from anisomesh.cli.progress import announce_compilation, progress
 
 if TYPE_CHECKING:
@@ -73,14 +74,15 @@ def command(
         announce_compilation(display, "remesh", "evaluate")
     out.mkdir(parents=True, exist_ok=True)
     stem = out / wanted.name
-    rows = run_suite(
-        wanted,
-        stem.with_suffix(".jsonl"),
-        data=data,
-        items=items,
-        workers=pool,
-        on_step=lambda step: None if quiet else _print(step),
-    )
+    with exit_at_sigterm():
+        rows = run_suite(
+            wanted,
+            stem.with_suffix(".jsonl"),
+            data=data,
+            items=items,
+            workers=pool,
+            on_step=lambda step: None if quiet else _print(step),
+        )
     chart = _chart(wanted, rows)
     texts = {".svg": chart} if chart else {}
     texts[".md"] = markdown(wanted, rows, f"{wanted.name}.svg" if chart else "")

@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from anisomesh.cli.arguments import Workers
+from anisomesh.cli.ending import exit_at_sigterm
 from anisomesh.cli.log import logs
 from anisomesh.cli.progress import announce_compilation, progress
 from anisomesh.cli.report import counted, table
@@ -78,7 +79,8 @@ def build_command(
     with progress(quiet) as display:
         announce_compilation(display, "remesh")
     on_row = _ignore if quiet else _print
-    rows = build(sources, out, recipe, remesh, workers=pool, on_row=on_row)
+    with exit_at_sigterm():
+        rows = build(sources, out, recipe, remesh, workers=pool, on_row=on_row)
     typer.echo(_summary(rows))
 
 

@@ -1,7 +1,7 @@
 """Entry point of the ``anisomesh`` command: subcommands, exit codes, errors in one line.
 
 Exit codes: 0 done, 1 anisomesh refused or failed (one line on stderr), 2 wrong usage, 3 some jobs of a batch failed,
-130 interrupted.
+130 interrupted, 143 ended by SIGTERM (commands with workers).
 """
 
 from __future__ import annotations
