@@ -11,12 +11,12 @@ from typing import Any
 
 import numpy.typing as npt
 
+from anisomesh.attributes.lost import losses_of_attributes
 from anisomesh.attributes.model import Mesh
 from anisomesh.attributes.transfer import oriented_as, transferred
 from anisomesh.caveats import (
     caveats,
     lengths_beyond,
-    losses_of_attributes,
     losses_of_repair,
     losses_of_shape,
     unfollowed_sizes,

@@ -8,7 +8,7 @@ import pytest
 
 import anisomesh
 from anisomesh import Mesh, Regions
-from anisomesh.caveats import losses_of_attributes
+from anisomesh.attributes.lost import losses_of_attributes
 from anisomesh.io.meshes import load_mesh, save
 from anisomesh.setup.fixed import curve_ends
 from anisomesh.shapes.analytic import box, open_patch

@@ -5,7 +5,8 @@ import pytest
 
 import anisomesh
 from anisomesh import Mesh, Regions
-from anisomesh.caveats import losses_of_attributes, losses_of_shape, unused_metric
+from anisomesh.attributes.lost import losses_of_attributes
+from anisomesh.caveats import losses_of_shape, unused_metric
 from anisomesh.setup.inputs import prepared_input
 from anisomesh.shapes import analytic as shapes
 
