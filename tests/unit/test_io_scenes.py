@@ -398,7 +398,7 @@ def test_several_materials_of_a_face_of_3mf_and_ones_that_there_are_not(tmp_path
     assert regions.labels.tolist() == [2, 1, 0, 2] * 2
     assert regions.names == {1: "red", 2: "blue"}
     assert lines_of(caplog) == [
-        "2 face(s) refer to materials, colours or texture coordinates that there are not",
+        "2 face(s) refer to missing materials, colours or texture coordinates",
         "2 face(s) have several materials and keep the first only",
     ]
 

@@ -129,7 +129,7 @@ def command(
         length(str(weld), "--weld")
     given = {name: value for name, value in options.items() if value != getattr(DEFAULT_OPTIONS, name)}
     given |= {"threads": threads, "weld_tolerance": weld, "gradation": gradation} | targets | fields | limits
-    jobs = _jobs(sources or [], manifest, {k: v for k, v in given.items() if v is not None}, output_format, Path(out))
+    jobs = _jobs(sources or [], manifest, {k: v for k, v in given.items() if v is not None}, output_format, out)
     settings = Settings(
         workers=WorkerPool(count=workers, scheduler=scheduler),
         shard=None if shard is None else _shard(shard),
@@ -140,7 +140,7 @@ def command(
 
 
 def _jobs(
-    sources: list[str], manifest: Path | None, options: dict[str, Any], output_format: str | None, out: Path
+    sources: list[str], manifest: Path | None, options: dict[str, Any], output_format: str | None, out: str
 ) -> list[Job]:
     from anisomesh.batch.inputs import jobs_of
     from anisomesh.batch.manifest import read_manifest

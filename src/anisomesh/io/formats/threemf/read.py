@@ -123,7 +123,7 @@ class _Build:
             given = np.array(found.properties, dtype=np.int64).reshape(-1, 4)
             is_reflected = bool(np.linalg.det(matrix[:3]) < 0.0)
             resources = self.model(key[0]).resources
-            self._properties.add(found.name, given, found.default, resources, turned=is_reflected)
+            self._properties.add(found.name, given, found.default, resources, inverted=is_reflected)
             self._sets.add(found.sets, len(faces))
             if is_reflected:
                 faces = faces[:, ::-1]  # a reflection turns triangles inside out
