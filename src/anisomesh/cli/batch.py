@@ -40,7 +40,7 @@ from anisomesh.cli.remeshing.shared_options import (
     NormOfAdaption,
     Ratios,
 )
-from anisomesh.cli.spelling import as_options, spelled
+from anisomesh.cli.spelling import as_options, in_one_line, spelled
 from anisomesh.options import MAX_THREADS
 
 if TYPE_CHECKING:
@@ -225,7 +225,7 @@ def _show(display: Display, listed: set[str], step: Progress) -> None:
 
     row = step.row
     if row["status"] != "done":
-        error = " ".join(row["error"].split())
+        error = in_one_line(row["error"])
         display.note(f"{row['status']}: {row['output']}: {error if row['output'] in listed else as_options(error)}")
     left = f"{step.seconds_left / 60:.0f} min left" if step.seconds_left >= 60 else f"{step.seconds_left:.0f} s left"
     display(StepInfo(stage="batch", iteration=step.number, total=step.total, message=left))

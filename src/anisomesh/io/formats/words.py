@@ -1,4 +1,4 @@
-"""Numbers in lines of text, with errors that name the line."""
+"""Texts and numbers of files: how they are decoded and parsed, with errors that name what is wrong."""
 
 from __future__ import annotations
 

@@ -10,7 +10,7 @@ import re
 import numpy as np
 import numpy.typing as npt
 
-from anisomesh.io.carried import Carried
+from anisomesh.io.carried import Carried, listed
 from anisomesh.io.formats.gmsh.data import (
     name_regions,
     read_comments,
@@ -31,7 +31,6 @@ _PARAMETRIC = "ParametricNodes"
 _DATA = ("NodeData", "ElementData", "ElementNodeData")
 _GROUPS = ("PhysicalNames", "Entities", "PartitionedEntities")
 _READ = (HEADER, COMMENTS, *_GROUPS, "Nodes", _PARAMETRIC, "Elements", *_DATA)
-_MOST_SHOWN = 200  # characters of a remark
 
 
 def read_msh(data: bytes) -> PolygonSoup:
@@ -74,7 +73,7 @@ def read_msh(data: bytes) -> PolygonSoup:
             unit = "byte(s)" if stream.binary else "number(s)"
             carried.remarks.append(f"left out {stream.n_left} {unit} behind the {what} that it declares")
     if skipped := [other for other in dict.fromkeys(file.names) if other not in _READ]:
-        carried.remarks.append(f"left out its {', '.join(skipped)}"[:_MOST_SHOWN])
+        carried.remarks.append(f"left out its {listed(skipped)}")
     return elements.soup(points, carried, at_nodes)
 
 
