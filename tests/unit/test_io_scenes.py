@@ -165,6 +165,13 @@ def test_a_line_says_how_many_lines_and_points_a_glb_file_has(tmp_path, caplog):
     assert lines_of(caplog) == ["left out 9 line(s) and 4 point(s) that its meshes have besides triangles"]
 
 
+def test_lines_without_positions_do_not_hinder(tmp_path, caplog):
+    """Regression: the count of the lines refused the file, though nothing is drawn of them."""
+    (tmp_path / "a.glb").write_bytes(fan({"attributes": {}, "mode": 1}, {"mode": 0}))
+    assert load(tmp_path / "a.glb").n_faces == 2
+    assert lines_of(caplog) == []
+
+
 def test_an_accessor_without_data_is_zeros(tmp_path, caplog):
     """Regression: the attribute was left out as malformed."""
     zeros = {"componentType": 5126, "count": 4, "type": "VEC2"}
