@@ -8,7 +8,7 @@ from pathlib import Path
 import pytest
 
 from anisomesh.batch import Job, Settings, WorkerPool
-from anisomesh.batch.at_work import at_work
+from anisomesh.batch.folder_lock import locked_folder
 from anisomesh.batch.inputs import jobs_of
 from anisomesh.batch.jobs import checked
 from anisomesh.batch.manifest import read_manifest
@@ -260,11 +260,11 @@ def test_two_batches_at_once_in_one_folder_are_refused(folder):
 
 @pytest.mark.skipif(os.name == "nt", reason="no locks")
 def test_shards_share_a_folder_and_the_same_one_does_not_run_twice(folder):
-    with at_work(folder, (1, 2)), at_work(folder, (2, 2)):
+    with locked_folder(folder, (1, 2)), locked_folder(folder, (2, 2)):
         for shard, who in ((None, "a batch, or a shard"), ((2, 2), "shard 2 of 2")):
-            with pytest.raises(AnisomeshError, match=f"{who}.* at work in this folder"), at_work(folder, shard):
+            with pytest.raises(AnisomeshError, match=f"{who}.* at work in this folder"), locked_folder(folder, shard):
                 pass
-    with at_work(folder, None):
+    with locked_folder(folder, None):
         pass
 
 
@@ -286,7 +286,7 @@ def test_file_systems_without_locks_are_said(folder, monkeypatch, caplog):
         raise OSError(95, "not supported")
 
     monkeypatch.setattr("fcntl.flock", refuse)
-    with at_work(folder, None):
+    with locked_folder(folder, None):
         assert "its file system has no locks" in caplog.text
 
 

@@ -24,7 +24,7 @@ from anisomesh.io.formats.gmsh.elements import Elements, TagTable, elements_2_bi
 from anisomesh.io.formats.gmsh.groups import each_once
 from anisomesh.io.formats.gmsh.numbers import NumberStream
 from anisomesh.io.formats.gmsh.sections import COMMENTS, HEADER, GmshFile
-from anisomesh.io.formats.words import reals, shown, text_of, whole, with_line_feeds
+from anisomesh.io.formats.words import parsed_reals, shown, text_of, whole, with_line_feeds
 from anisomesh.io.polygons import Integers, PolygonSoup
 
 _PARAMETRIC = "ParametricNodes"
@@ -106,7 +106,7 @@ def _nodes_2(numbers: NumberStream, *, parametric: bool) -> tuple[Integers, npt.
     rows = [line.split()[:4] for line in numbers.lines(count)]
     if any(len(row) < 4 for row in rows):
         raise ValueError("truncated: a line of the parametric nodes has fewer than 4 numbers")
-    table = reals([word for row in rows for word in row]).reshape(count, 4)
+    table = parsed_reals([word for row in rows for word in row]).reshape(count, 4)
     return whole(table[:, 0]), table[:, 1:]
 
 
