@@ -81,7 +81,7 @@ def test_folders_patterns_and_files_keep_their_folders(meshes):
 def test_results_below_an_input_folder_are_no_inputs(meshes):
     (meshes / "out").mkdir()
     (meshes / "out/a.obj").write_bytes((meshes / "a.obj").read_bytes())
-    found = jobs_of([str(meshes)], TARGET, without=meshes / "out")
+    found = jobs_of([str(meshes)], TARGET, without=str(meshes / "out"))
     assert [job.output for job in found] == ["a.obj", "b.obj", "sub/a.obj"]
 
 

@@ -8,7 +8,7 @@ from pathlib import Path
 import pytest
 
 from anisomesh.batch import Job, Settings, WorkerPool
-from anisomesh.batch.at_work import at_work
+from anisomesh.batch.folder_lock import locked_folder
 from anisomesh.batch.inputs import jobs_of
 from anisomesh.batch.jobs import checked
 from anisomesh.batch.manifest import read_manifest
@@ -179,6 +179,31 @@ def test_a_mesh_that_is_named_through_a_link_too_is_one_job_unless_its_output_is
     assert sorted(job.output for job in pattern) == ["in/b.obj", "link/b.obj"]
 
 
+def test_outputs_at_an_address_below_the_inputs_are_not_inputs(folder):
+    """Regression: only outputs in a folder of this machine were left out, so a second batch remeshed the results."""
+    memory = pytest.importorskip("fsspec").filesystem("memory")
+    for name in ("a.obj", "small/a.obj", "smaller/a.obj"):
+        memory.pipe(f"/below/{name}", (folder / "a.obj").read_bytes())
+    for out in ("memory://below/small", "memory:///below/small/"):
+        for name in ("memory://below", "memory://below/**/*.obj"):
+            found = jobs_of([name], TARGET, without=out)
+            assert [job.output for job in found] == ["a.obj", "smaller/a.obj"], (name, out)
+    assert len(jobs_of(["memory://below"], TARGET, without=str(folder / "small"))) == 3
+    assert len(jobs_of([str(folder)], TARGET, without="memory://below/small")) == 1
+
+
+@pytest.mark.parametrize(
+    "name", ["memory://signs/a?.obj", "memory://signs/a[12].obj", "memory:///signs/", "memory:///signs/*"]
+)
+def test_outputs_of_addresses_have_the_paths_below_what_was_named(folder, name):
+    """Regression: of patterns with ? or [, and of other spellings of an address, a job would have written its input."""
+    memory = pytest.importorskip("fsspec").filesystem("memory")
+    for file in ("a1.obj", "a2.obj"):
+        memory.pipe(f"/signs/{file}", (folder / "a.obj").read_bytes())
+    found = jobs_of([name], TARGET)
+    assert [(job.input, job.output) for job in found] == [(f"memory://signs/{k}", k) for k in ("a1.obj", "a2.obj")]
+
+
 def test_links_that_lead_nowhere_are_refused_rows(folder):
     """Regression: they were left out without a word."""
     (folder / "lost.obj").symlink_to(folder / "gone.obj")
@@ -235,11 +260,11 @@ def test_two_batches_at_once_in_one_folder_are_refused(folder):
 
 @pytest.mark.skipif(os.name == "nt", reason="no locks")
 def test_shards_share_a_folder_and_the_same_one_does_not_run_twice(folder):
-    with at_work(folder, (1, 2)), at_work(folder, (2, 2)):
+    with locked_folder(folder, (1, 2)), locked_folder(folder, (2, 2)):
         for shard, who in ((None, "a batch, or a shard"), ((2, 2), "shard 2 of 2")):
-            with pytest.raises(AnisomeshError, match=f"{who}.* at work in this folder"), at_work(folder, shard):
+            with pytest.raises(AnisomeshError, match=f"{who}.* at work in this folder"), locked_folder(folder, shard):
                 pass
-    with at_work(folder, None):
+    with locked_folder(folder, None):
         pass
 
 
@@ -261,7 +286,7 @@ def test_file_systems_without_locks_are_said(folder, monkeypatch, caplog):
         raise OSError(95, "not supported")
 
     monkeypatch.setattr("fcntl.flock", refuse)
-    with at_work(folder, None):
+    with locked_folder(folder, None):
         assert "its file system has no locks" in caplog.text
 
 

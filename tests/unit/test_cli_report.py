@@ -34,7 +34,7 @@ def step(stage, iteration, total=10, energy=None, message=""):
 def test_a_name_with_line_breaks_stays_in_its_row():
     """Regression: a line break in the name of a node broke the table, and the lines of the log."""
     text = table([("regions", "node: 1 (a/b\r\nc\x1b[2J \u2028d = 0)"), ("unit", "metre")])
-    assert text.splitlines() == ["  regions  node: 1 (a/b c [2J  d = 0)", "  unit     metre"]
+    assert text.splitlines() == ["  regions  node: 1 (a/b c [2J d = 0)", "  unit     metre"]
 
 
 def test_a_message_of_the_log_is_one_line(capsys):

@@ -165,6 +165,13 @@ def test_a_line_says_how_many_lines_and_points_a_glb_file_has(tmp_path, caplog):
     assert lines_of(caplog) == ["left out 9 line(s) and 4 point(s) that its meshes have besides triangles"]
 
 
+def test_lines_without_positions_do_not_hinder(tmp_path, caplog):
+    """Regression: the count of the lines refused the file, though nothing is drawn of them."""
+    (tmp_path / "a.glb").write_bytes(fan({"attributes": {}, "mode": 1}, {"mode": 0}))
+    assert load(tmp_path / "a.glb").n_faces == 2
+    assert lines_of(caplog) == []
+
+
 def test_an_accessor_without_data_is_zeros(tmp_path, caplog):
     """Regression: the attribute was left out as malformed."""
     zeros = {"componentType": 5126, "count": 4, "type": "VEC2"}
@@ -398,7 +405,7 @@ def test_several_materials_of_a_face_of_3mf_and_ones_that_there_are_not(tmp_path
     assert regions.labels.tolist() == [2, 1, 0, 2] * 2
     assert regions.names == {1: "red", 2: "blue"}
     assert lines_of(caplog) == [
-        "2 face(s) refer to materials, colours or texture coordinates that there are not",
+        "2 face(s) refer to missing materials, colours or texture coordinates",
         "2 face(s) have several materials and keep the first only",
     ]
 

@@ -105,6 +105,31 @@ def test_names_in_latin_1_are_the_ones_in_utf_8(tmp_path, suffix):
     assert_equal(expected, load_mesh(path))
 
 
+def test_strings_and_names_in_vtk_files_may_be_in_latin_1(tmp_path):
+    """Regression: they lost letters, unlike names in other formats."""
+
+    def array(kind, name, values, width=1):
+        numbers = " ".join(map(str, values))
+        given = f'type="{kind}" Name="{name}" NumberOfComponents="{width}" format="ascii"'
+        return f"<DataArray {given}>{numbers}</DataArray>" if kind != "String" else f"<Array {given}>{numbers}</Array>"
+
+    names = f"1 {FIRST}\n2 {SECOND}".encode("latin-1")
+    strings = b"".join(name.encode("latin-1") + b"\0" for name in (FIRST, SECOND))
+    content = (
+        '<VTKFile type="PolyData" version="1.0"><PolyData>'
+        f"<FieldData>{array('UInt8', 'regions of part', names)}</FieldData>"
+        '<Piece NumberOfPoints="4" NumberOfPolys="2">'
+        f"<Points>{array('Float64', 'Points', [0, 0, 0, 1, 0, 0, 1, 1, 0, 0, 1, 0], 3)}</Points>"
+        f"<CellData>{array('Int32', 'part', [1, 2])}{array('String', 'maker', strings)}</CellData>"
+        f"<Polys>{array('Int64', 'connectivity', [0, 1, 2, 0, 2, 3])}{array('Int64', 'offsets', [3, 6])}</Polys>"
+        "</Piece></PolyData></VTKFile>"
+    )
+    (tmp_path / "a.vtp").write_text(content)
+    mesh = load_mesh(tmp_path / "a.vtp")
+    assert mesh.face_data["maker"].tolist() == [FIRST, SECOND]
+    assert mesh.regions["part"].names == {1: FIRST, 2: SECOND}
+
+
 def test_material_files_in_latin_1_describe_the_materials_of_the_mesh_and_are_written_in_utf_8(tmp_path, caplog):
     (tmp_path / "grün.mtl").write_bytes("newmtl grün\r\nKd 1 0 0\r\n".encode("latin-1"))
     (tmp_path / "a.obj").write_bytes(f"mtllib grün.mtl\n{POINTS}usemtl grün\nf 1 2 3\n".encode("latin-1"))
@@ -188,10 +213,13 @@ def test_a_file_with_the_extension_of_another_format_is_recognised(tmp_path, suf
 
 
 def test_text_in_utf_16_is_recognised_in_both_byte_orders(tmp_path):
+    """Regression: of STL the message was about the size of a binary file."""
+    texts = {"a.obj": f"{POINTS}f 1 2 3\n", "a.stl": f"solid\n{FACET.format(0)}endsolid\n"}
     for mark, order in ((codecs.BOM_UTF16_LE, "utf-16-le"), (codecs.BOM_UTF16_BE, "utf-16-be")):
-        (tmp_path / "a.obj").write_bytes(mark + f"{POINTS}f 1 2 3\n".encode(order))
-        with pytest.raises(MeshFileError, match="text in UTF-16"):
-            load_mesh(tmp_path / "a.obj")
+        for name, text in texts.items():
+            (tmp_path / name).write_bytes(mark + text.encode(order))
+            with pytest.raises(MeshFileError, match="text in UTF-16"):
+                load_mesh(tmp_path / name)
 
 
 PLY = "ply\nformat ascii 1.0\nelement vertex 3\nproperty float x\nproperty float y\nproperty float z\nelement face 1\n"

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 
 import numpy as np
 
@@ -46,8 +46,7 @@ def _shrunk_regions(before: Mesh, after: Mesh) -> Iterator[str]:
             name = regions.names.get(int(labels[k]), f"{division} {labels[k]}")
             lost.append(f"{name} ({new[k] / old[k] - 1.0:+.0%})")
     if lost:
-        more = f" and {len(lost) - _MAX_LOST_NAMED:,} more" if len(lost) > _MAX_LOST_NAMED else ""
-        yield f"regions have lost area: {', '.join(lost[:_MAX_LOST_NAMED])}{more}; ask for more vertices"
+        yield f"regions have lost area: {_listed(lost)}; ask for more vertices"
 
 
 def _lost_curves(before: Mesh, after: Mesh) -> Iterator[str]:
@@ -58,8 +57,7 @@ def _lost_curves(before: Mesh, after: Mesh) -> Iterator[str]:
         gone = np.setdiff1d(regions.labels, 0 if found is None else np.append(found.labels, 0))
         lost += [regions.names.get(label, f"{division} {label}") for label in gone.tolist()]
     if lost:
-        more = f" and {len(lost) - _MAX_LOST_NAMED:,} more" if len(lost) > _MAX_LOST_NAMED else ""
-        yield f"no edges follow the lines {', '.join(lost[:_MAX_LOST_NAMED])}{more}; ask for more vertices"
+        yield f"no edges follow the lines {_listed(lost)}; ask for more vertices"
 
 
 def _shorter_lines(before: Mesh, after: Mesh) -> Iterator[str]:
@@ -67,6 +65,12 @@ def _shorter_lines(before: Mesh, after: Mesh) -> Iterator[str]:
     old, new = (_length(mesh) for mesh in (before, after))
     if new < (1.0 - _LOST_SHARE) * old:
         yield f"edges along prescribed lines are shorter in all ({new / old - 1.0:+.0%}); ask for more vertices"
+
+
+def _listed(names: Sequence[str]) -> str:
+    """Return some names, and the number of further ones."""
+    more = f" and {len(names) - _MAX_LOST_NAMED:,} more" if len(names) > _MAX_LOST_NAMED else ""
+    return ", ".join(names[:_MAX_LOST_NAMED]) + more
 
 
 def _length(mesh: Mesh) -> float:

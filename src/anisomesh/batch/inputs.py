@@ -14,7 +14,7 @@ from anisomesh.io.known_formats import MESH_FORMATS
 
 
 def jobs_of(
-    names: Sequence[str], options: Options, *, output_format: str | None = None, without: Path | None = None
+    names: Sequence[str], options: Options, *, output_format: str | None = None, without: str | None = None
 ) -> list[Job]:
     """Return the jobs for files, folders with all meshes below them, and patterns such as ``scans/**/*.ply``.
 
@@ -27,19 +27,22 @@ def jobs_of(
     output_format
         Format of the outputs, such as ``ply``; by default the one of each input.
     without
-        A folder whose meshes are left out: the one that the outputs are written to.
+        A folder, also as an address, whose meshes are left out: the one that the outputs are written to.
 
     Returns
     -------
     jobs
         Each mesh once, however often and by whatever path it is named. The output has the name of the input, and keeps
-        the folders below the one that was named, or below the part of a pattern before its first ``*``. Files and
-        folders below it whose names begin with a point are left out; links that lead nowhere are not.
+        the folders below the one that was named, or below the folders of a pattern before the first that has one of
+        ``*``, ``?`` and ``[``. Hidden files and folders below it (names that begin with a dot) are left out; broken
+        links are not.
 
     Raises
     ------
     OptionError
         If a file, folder or pattern has no mesh, or an option is unknown or out of range.
+    MeshFileError
+        If an address cannot be read.
     """
     if names:
         plain_options(options, "")  # the first job would be blamed for what is wrong in all
@@ -55,10 +58,15 @@ def jobs_of(
     return found
 
 
-def _meshes(name: str, without: Path | None) -> list[tuple[str, str]]:
+def _meshes(name: str, without: str | None) -> list[tuple[str, str]]:
     """Return the meshes that are meant by a name, each with its path below the folder that was named."""
-    if is_address(name):
-        return _addresses(name)
+    meshes = _addresses(name, without) if is_address(name) else _paths(name, without)
+    if not meshes:
+        raise OptionError(f"{name}: no meshes found; expected files ending in {', '.join(sorted(MESH_FORMATS))}")
+    return meshes
+
+
+def _paths(name: str, without: str | None) -> list[tuple[str, str]]:
     path = _without_steps_up(Path(absolute(name)))
     if path.is_file():
         return [(str(path), path.name)]
@@ -71,24 +79,20 @@ def _meshes(name: str, without: Path | None) -> list[tuple[str, str]]:
         raise OptionError(
             f"{name}: {why_unreadable(path, FileNotFoundError())}; expected a mesh, a folder or a pattern"
         )
-    hidden = None if without is None else without.resolve()
-    meshes = [p for p in paths if p.suffix.lower() in MESH_FORMATS and _is_file(p) and not _is_hidden(p, base)]
-    meshes = [p for p in meshes if hidden is None or hidden not in p.resolve().parents]
-    if not meshes:
-        raise OptionError(f"{name}: no meshes found; expected files ending in {', '.join(sorted(MESH_FORMATS))}")
-    return [(str(p), p.relative_to(base).as_posix()) for p in meshes]
+    outputs = None if without is None or is_address(without) else Path(absolute(without)).resolve()
+    files = ((p, p.relative_to(base).as_posix()) for p in paths)
+    meshes = [(p, below) for p, below in files if _is_shown_mesh(below) and _is_file(p)]
+    return [(str(p), below) for p, below in meshes if outputs is None or outputs not in p.resolve().parents]
 
 
-def _addresses(name: str) -> list[tuple[str, str]]:
-    files = files_below(name)
-    if files is None:
-        return [(name, Path(name).name)]
-    base = name.partition("*")[0].rpartition("/")[0] if "*" in name else name.rstrip("/")
-    found = [(file, file.removeprefix(base).lstrip("/")) for file in files if suffix_of(file) in MESH_FORMATS]
-    meshes = [(file, below) for file, below in found if not _is_hidden(Path(file), Path(base))]
-    if not meshes:
-        raise OptionError(f"{name}: no meshes found; expected files ending in {', '.join(sorted(MESH_FORMATS))}")
-    return meshes
+def _addresses(name: str, without: str | None) -> list[tuple[str, str]]:
+    files = files_below(name, without)
+    return [(name, Path(name).name)] if files is None else [file for file in files if _is_shown_mesh(file[1])]
+
+
+def _is_shown_mesh(path: str) -> bool:
+    """Return whether a file has the suffix of a mesh, and neither it nor a folder above it a name with a dot first."""
+    return suffix_of(path) in MESH_FORMATS and not any(part.startswith(".") for part in PurePosixPath(path).parts)
 
 
 def _without_steps_up(path: Path) -> Path:
@@ -108,10 +112,6 @@ def _fixed_part(pattern: Path) -> Path:
     parts = list(pattern.parts[:-1])
     first = next((k for k, part in enumerate(parts) if glob.has_magic(part)), len(parts))
     return Path(*parts[:first])
-
-
-def _is_hidden(path: Path, base: Path) -> bool:
-    return any(part.startswith(".") for part in path.relative_to(base).parts)
 
 
 def in_format(name: str, output_format: str | None) -> str:

@@ -57,7 +57,7 @@ def read_manifest(path: Path, options: Options, *, output_format: str | None = N
         check_keys(where, row, _KNOWN_COLUMNS)
         jobs.append(_job(where, row, options, path.parent, output_format))
     if not jobs:
-        raise OptionError(f"{path}: there are no rows; expected a row for each mesh")
+        raise OptionError(f"{path}: it has no rows; expected a row for each mesh")
     return jobs
 
 

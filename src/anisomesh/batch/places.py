@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import hashlib
 import os
+import re
 import tempfile
 from collections.abc import Iterator
 from contextlib import contextmanager
@@ -13,6 +14,7 @@ from typing import Any
 from anisomesh.errors import AnisomeshError, MeshFileError, why_unreadable
 
 _LOCAL = "file://"
+_PATTERN_SIGNS = re.compile(r"[*?\[]")
 _WHOLE_AT_ONCE = frozenset({"s3", "s3a", "gs", "gcs", "abfs", "abfss", "az", "adl", "oss", "memory"})
 """File systems on which a file appears when it is complete."""
 
@@ -134,25 +136,51 @@ def local_output(place: str) -> Iterator[str]:
             _on(f"{above}/{path.name}", lambda fs, target, path=path: _put(fs, str(path), target))
 
 
-def files_below(place: str) -> list[str] | None:
-    """Return the addresses of all files below an address, or that match one with ``*``; None if it is a single file.
+def files_below(place: str, without: str | None = None) -> list[tuple[str, str]] | None:
+    """Return all files below an address, or that match one with ``*``, ``?`` or ``[``; None if it is a single file.
+
+    Parameters
+    ----------
+    place
+        The address.
+    without
+        A folder whose files are left out, wherever it is.
+
+    Returns
+    -------
+    files
+        The address of each file, and its path below the folder, or below the folders of a pattern before the first
+        that has such a sign.
 
     Raises
     ------
     MeshFileError
-        If there is nothing.
+        If a file system cannot be read, or is unknown.
     """
     protocol = place.partition("://")[0]
 
-    def found(fs: Any, path: str) -> list[str] | None:
-        if any(sign in path for sign in "*?["):
-            return [f"{protocol}://{name.lstrip('/')}" for name in sorted(fs.glob(path)) if fs.isfile(name)]
-        if fs.isdir(path):
-            return [f"{protocol}://{name.lstrip('/')}" for name in sorted(fs.find(path))]
-        return None
+    def found(fs: Any, path: str) -> list[tuple[str, str]] | None:
+        sign = _PATTERN_SIGNS.search(path)
+        if sign is not None:
+            base, names = path[: sign.start()].rpartition("/")[0], [name for name in fs.glob(path) if fs.isfile(name)]
+        elif fs.isdir(path):
+            base, names = path, fs.find(path)
+        else:
+            return None
+        hidden = _path_on(fs, protocol, without)
+        kept = [name for name in sorted(names) if hidden is None or not name.startswith(hidden)]
+        return [(f"{protocol}://{name.lstrip('/')}", name.removeprefix(base).lstrip("/")) for name in kept]
 
-    result: list[str] | None = _on(place, found)
+    result: list[tuple[str, str]] | None = _on(place, found)
     return result
+
+
+def _path_on(fs: Any, protocol: str, folder: str | None) -> str | None:
+    """Return the path of a folder on a file system, with a slash at its end; None if it is not on this one."""
+    if folder is None or folder.partition("://")[0] != protocol:
+        return None
+    found: str | None = _on(folder, lambda other, path: f"{path.rstrip('/')}/" if other == fs else None)
+    return found
 
 
 def _put(fs: Any, path: str, target: str) -> None:

@@ -11,7 +11,7 @@ from importlib.metadata import version
 from operator import attrgetter
 from pathlib import Path
 
-from anisomesh.batch.at_work import at_work
+from anisomesh.batch.folder_lock import locked_folder
 from anisomesh.batch.jobs import Job, checked
 from anisomesh.batch.places import absolute, is_address, joined
 from anisomesh.batch.reports import PAGE, write_page, write_parquet
@@ -95,7 +95,7 @@ class Batch:
         See :func:`~anisomesh.batch.jobs.checked`.
     AnisomeshError
         If a row of an earlier call cannot be read, or another batch is at work in the folder, see
-        :func:`~anisomesh.batch.at_work.at_work`.
+        :func:`~anisomesh.batch.folder_lock.locked_folder`.
 
     Notes
     -----
@@ -109,7 +109,7 @@ class Batch:
         first, step = self.settings.shard or (1, 1)
         self.jobs = checked(jobs, self._outputs)[first - 1 :: step]
         with ExitStack() as held:
-            held.enter_context(at_work(self.folder, self.settings.shard))
+            held.enter_context(locked_folder(self.folder, self.settings.shard))
             self.results = Results(self.folder, self.settings.shard)
             self._rows = self.results.rows()
             self.left = [job for job in self.jobs if not is_done(job, self._rows.get(job.output), self._outputs)]

@@ -40,7 +40,7 @@ from anisomesh.cli.remeshing.shared_options import (
     NormOfAdaption,
     Ratios,
 )
-from anisomesh.cli.spelling import as_options, spelled
+from anisomesh.cli.spelling import as_options, in_one_line, spelled
 from anisomesh.options import MAX_THREADS
 
 if TYPE_CHECKING:
@@ -129,7 +129,7 @@ def command(
         length(str(weld), "--weld")
     given = {name: value for name, value in options.items() if value != getattr(DEFAULT_OPTIONS, name)}
     given |= {"threads": threads, "weld_tolerance": weld, "gradation": gradation} | targets | fields | limits
-    jobs = _jobs(sources or [], manifest, {k: v for k, v in given.items() if v is not None}, output_format, Path(out))
+    jobs = _jobs(sources or [], manifest, {k: v for k, v in given.items() if v is not None}, output_format, out)
     settings = Settings(
         workers=WorkerPool(count=workers, scheduler=scheduler),
         shard=None if shard is None else _shard(shard),
@@ -140,7 +140,7 @@ def command(
 
 
 def _jobs(
-    sources: list[str], manifest: Path | None, options: dict[str, Any], output_format: str | None, out: Path
+    sources: list[str], manifest: Path | None, options: dict[str, Any], output_format: str | None, out: str
 ) -> list[Job]:
     from anisomesh.batch.inputs import jobs_of
     from anisomesh.batch.manifest import read_manifest
@@ -225,7 +225,7 @@ def _show(display: Display, listed: set[str], step: Progress) -> None:
 
     row = step.row
     if row["status"] != "done":
-        error = " ".join(row["error"].split())
+        error = in_one_line(row["error"])
         display.note(f"{row['status']}: {row['output']}: {error if row['output'] in listed else as_options(error)}")
     left = f"{step.seconds_left / 60:.0f} min left" if step.seconds_left >= 60 else f"{step.seconds_left:.0f} s left"
     display(StepInfo(stage="batch", iteration=step.number, total=step.total, message=left))

@@ -12,6 +12,8 @@ from typing import Annotated, Any
 
 import typer
 
+from anisomesh.cli.spelling import in_one_line
+
 _LEVELS = (logging.WARNING, logging.INFO, logging.DEBUG)  # by the number of -v
 _Verbose = Annotated[
     int,
@@ -30,8 +32,7 @@ class _Lines(logging.Handler):
 
     def emit(self, record: logging.LogRecord) -> None:
         """Print a record."""
-        message = " ".join(record.getMessage().splitlines())  # names in it may have line breaks
-        line = f"anisomesh: {record.levelname.lower()}: {message}"
+        line = f"anisomesh: {record.levelname.lower()}: {in_one_line(record.getMessage())}"
         if record.levelno >= logging.WARNING:
             if line in self._warned:
                 return

@@ -19,7 +19,7 @@ from anisomesh.cli.info.command import command as info_command
 from anisomesh.cli.log import logs
 from anisomesh.cli.ratios import RatiosCommand
 from anisomesh.cli.remeshing.command import command as remesh_command
-from anisomesh.cli.spelling import as_options
+from anisomesh.cli.spelling import as_options, in_one_line
 from anisomesh.errors import AnisomeshError
 
 # The base class of all usage errors; typer exports only this subclass.
@@ -109,7 +109,7 @@ _WORDS_OF_TYPER = {  # what versions of it that use pydantic say, and we in plac
 
 
 def _fail(message: str, status: int) -> int:
-    print(f"anisomesh: error: {' '.join(message.split())}", file=sys.stderr)
+    print(f"anisomesh: error: {in_one_line(message)}", file=sys.stderr)
     return status
 
 

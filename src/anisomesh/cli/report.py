@@ -3,11 +3,10 @@
 from __future__ import annotations
 
 import json
-import re
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from anisomesh.cli.spelling import warning_rows
+from anisomesh.cli.spelling import in_one_line, warning_rows
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -24,7 +23,6 @@ _METRICS = {
     "approximation": "metric of the least distance, from the measured curvature",
     "uniform": "the same lengths in all directions",
 }
-_LINE_BREAKS = re.compile(r"[\x00-\x1f\x7f-\x9f\u2028\u2029]+")  # and other characters that move the cursor
 _STAGE_ORDER = ("load", "prepare", "metric", "embed", "cvt", "dual", "fit", "attributes")
 
 
@@ -51,7 +49,7 @@ def counted(count: int, singular: str, plural: str | None = None) -> str:
 def table(rows: Sequence[tuple[str, str]]) -> str:
     """Return rows as text in two aligned columns, a line each, whatever line breaks and tabs names in them have."""
     width = max(len(name) for name, _ in rows)
-    return "\n".join(f"  {name:<{width}}  {_LINE_BREAKS.sub(' ', text)}" for name, text in rows)
+    return "\n".join(f"  {name:<{width}}  {in_one_line(text)}" for name, text in rows)
 
 
 def hints(prepared: Surface) -> list[str]:

@@ -24,7 +24,13 @@ _NAME = re.compile(
     rf"(?<![\w./\\'\"-])({_UNMISTAKABLE})(?!\w|[./\\'\"-]\w)"  # not in file names and quotations
     rf"|(?:(?<=^)|(?<=: ))({_ENGLISH})(?=\[| = | has \d| ['\d])"  # in front of a value: they are words of English
 )
+_LINE_BREAKS = re.compile(r"\s*[\x00-\x1f\x7f-\x9f\u2028\u2029]+\s*")
 _LINE_OF_FILE = re.compile(r", line \d+: ")
+
+
+def in_one_line(text: str) -> str:
+    """Return a text with a blank for line breaks, tabs and other characters that move the cursor, in names too."""
+    return _LINE_BREAKS.sub(" ", text).strip()
 
 
 def spelled(name: str) -> str:

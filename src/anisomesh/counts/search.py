@@ -15,7 +15,8 @@ from anisomesh.result import RemeshResult
 
 MAX_SEARCH_RUNS = 16  # heuristic; ten are usual
 COUNT_PRECISION = 1.03  # the search ends when a count smaller by this factor is known to be too small
-FIRST_RATIO, MOST_AT_FIRST = 0.1, 2_000  # vertices per vertex of the surface in the first run, and at most; heuristics
+FIRST_RATIO = 0.1  # vertices per vertex of the surface, for the first run; heuristic
+MAX_FIRST_COUNT = 2_000  # largest count of the first run; heuristic
 MAX_RATIO, MAX_MORE = 4, 1_000  # largest count: ratio times the vertices of the surface, and more
 _ENDED = "the time limit ended the search for fewer vertices"
 DISTANCE_SAMPLES = 50_000  # points on each surface besides vertices and edge midpoints; the largest are followed
@@ -75,7 +76,7 @@ def smallest_within(
         return max(error, lost)
 
     counts = Counts(
-        first=max(least, min(round(FIRST_RATIO * surface.n_points), MOST_AT_FIRST)),
+        first=max(least, min(round(FIRST_RATIO * surface.n_points), MAX_FIRST_COUNT)),
         least=least,
         most=MAX_RATIO * surface.n_points + MAX_MORE,
         milestone=surface.n_points,

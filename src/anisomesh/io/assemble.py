@@ -42,13 +42,7 @@ def as_mesh(soup: PolygonSoup) -> tuple[Mesh, tuple[str, ...], tuple[str, ...]]:
     for name in rows["point_data"].keys() & rows["corner_data"].keys():
         del rows["point_data"][name]
         carried.remarks.append(f"left out point data {name!r}, which is given at corners too")
-    regions = {}
-    for name, division in carried.divisions.items():
-        labels = _rows(carried, {name: division.labels}, "regions", triangles.source)
-        if labels:
-            present = set(np.unique(labels[name]).tolist())
-            names = {label: text for label, text in division.names.items() if label in present}
-            regions[name] = Regions(labels[name].astype(np.int64), names)
+    regions = _regions(carried, triangles.source)
     features, feature_regions = _features(carried, surface)
     fixed_points, fixed_point_regions = _fixed_points(carried, surface)
     mesh = Mesh(
@@ -67,6 +61,18 @@ def as_mesh(soup: PolygonSoup) -> tuple[Mesh, tuple[str, ...], tuple[str, ...]]:
         carried.remarks.append(f"left out cell data {lost} of lines and vertices")
     _say_empty_regions(carried, mesh)
     return mesh, triangles.remarks, tuple(dict.fromkeys(carried.remarks))
+
+
+def _regions(carried: Carried, source: Integers) -> dict[str, Regions]:
+    """Return the divisions of the faces, each of which is from a face or cell of the file (F,)."""
+    regions = {}
+    for name, division in carried.divisions.items():
+        labels = _rows(carried, {name: division.labels}, "regions", source)
+        if labels:
+            present = set(np.unique(labels[name]).tolist())
+            names = {label: text for label, text in division.names.items() if label in present}
+            regions[name] = Regions(labels[name].astype(np.int64), names)
+    return regions
 
 
 def _rows(carried: Carried, data: dict[str, Array], what: str, rows: Integers) -> dict[str, Array]:

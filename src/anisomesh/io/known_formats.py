@@ -25,6 +25,7 @@ from anisomesh.io.formats.threemf.read import read_3mf
 from anisomesh.io.formats.threemf.write import threemf_bytes
 from anisomesh.io.formats.vtk.read import read_vtp, read_vtu
 from anisomesh.io.formats.vtk.write import vtp_mesh_bytes, vtu_mesh_bytes
+from anisomesh.io.formats.words import BYTE_ORDER_MARK
 from anisomesh.io.holding.losses import Losses
 from anisomesh.io.polygons import PolygonSoup
 
@@ -55,11 +56,10 @@ WRITERS: dict[str, Callable[[Mesh, Losses], bytes]] = {
     ".meshb": meditb_bytes,
 }
 TEXT_FORMATS = (".obj", ".off", ".ply", ".msh", ".mesh")
-"""Extensions of formats of text, which may begin with a byte order mark."""
+"""Extensions of formats of text, which may begin with a byte order mark; text STL is found by its reader."""
 
 MESH_FORMATS = tuple(READERS)
 """Extensions of files that are read and written, in lower case with the dot."""
-
 
 _BEGINNINGS = (  # what a file begins with, the extensions that it may have, and what it is called in messages
     (rb"ply\s", (".ply",), "a PLY file"),
@@ -77,10 +77,10 @@ _BEGINNINGS = (  # what a file begins with, the extensions that it may have, and
 
 def mistaken_format(data: bytes, suffix: str) -> str:
     """Return what a file that cannot be read in a format seems to be instead, empty if that is not known."""
-    if suffix in TEXT_FORMATS and data.startswith((codecs.BOM_UTF16_LE, codecs.BOM_UTF16_BE)):
+    if suffix in (*TEXT_FORMATS, ".stl") and data.startswith((codecs.BOM_UTF16_LE, codecs.BOM_UTF16_BE)):
         return "text in UTF-16; save it in UTF-8"
     for beginning, suffixes, name in _BEGINNINGS:
-        if suffix not in suffixes and re.match(beginning, data.removeprefix(codecs.BOM_UTF8), re.IGNORECASE):
+        if suffix not in suffixes and re.match(beginning, data.removeprefix(BYTE_ORDER_MARK), re.IGNORECASE):
             return f"{name}; give it the extension {suffixes[0]}" if suffixes else name
     return ""
 

@@ -9,7 +9,7 @@ import numpy as np
 
 from anisomesh.attributes.model import Mesh
 from anisomesh.io.carried import COLOUR, NORMAL, UV, Array, Carried
-from anisomesh.io.formats.words import coordinates, integers, reals, shown, span
+from anisomesh.io.formats.words import coordinates, integers, parsed_reals, shown, span
 from anisomesh.io.holding.corners import continuous_corner_data
 from anisomesh.io.holding.losses import Losses
 from anisomesh.io.holding.normals import has_direction, with_all_normals
@@ -92,7 +92,7 @@ def _carried(head: bytes, vertices: list[bytes], colours: list[list[bytes]]) -> 
 
 def _table(rows: list[list[bytes]]) -> Array:
     """Return rows of equally many numbers (n, k)."""
-    return reals([word for row in rows for word in row]).reshape(len(rows), -1)
+    return parsed_reals([word for row in rows for word in row]).reshape(len(rows), -1)
 
 
 def _colours(rows: list[list[bytes]]) -> Array:

@@ -12,7 +12,7 @@ from anisomesh._arrays import Points
 from anisomesh.attributes.model import Mesh, Regions
 from anisomesh.io.carried import Carried
 from anisomesh.io.formats.region_names import divide, in_words, region_texts
-from anisomesh.io.formats.words import BYTE_ORDER_MARK, format_rows, reals, text_of, with_line_feeds
+from anisomesh.io.formats.words import BYTE_ORDER_MARK, format_rows, parsed_reals, text_of, with_line_feeds
 from anisomesh.io.holding.divisions import by_label, main_division
 from anisomesh.io.holding.losses import Losses
 from anisomesh.io.polygons import PolygonSoup
@@ -115,7 +115,7 @@ def _text_corners(text: bytearray, remarks: list[str]) -> Points:
         )
     if not has_end:
         remarks.append(f"it has no endsolid after its {n_facets} facets; check that none is missing")
-    return reals([word for row in found for word in row]).reshape(-1, 3)
+    return parsed_reals([word for row in found for word in row]).reshape(-1, 3)
 
 
 def stl_bytes(mesh: Mesh, losses: Losses) -> bytes:

@@ -1,4 +1,4 @@
-"""Numbers in lines of text, with errors that name the line."""
+"""Texts and numbers of files: how they are decoded and parsed, with errors that name what is wrong."""
 
 from __future__ import annotations
 
@@ -44,12 +44,12 @@ def with_line_feeds(data: bytes) -> bytes:
     return data.replace(b"\r\n", b"\n").replace(b"\r", b"\n") if b"\r" in data else data
 
 
-def reals(words: Sequence[bytes]) -> npt.NDArray[np.float64]:
+def parsed_reals(words: Sequence[bytes]) -> npt.NDArray[np.float64]:
     """Return words (n,) as real numbers; ValueError if one is not."""
     return _numbers(words, float, np.float64, "a number")
 
 
-def wholes(words: Sequence[bytes]) -> Integers:
+def parsed_integers(words: Sequence[bytes]) -> Integers:
     """Return words (n,) as integers; ValueError if one is not, or is too large."""
     return _numbers(words, int, np.int64, "an integer")
 

@@ -7,10 +7,8 @@ from anisomesh.attributes.model import Mesh
 OF_FEATURES, OF_FIXED_POINTS = "regions of feature edges", "regions of fixed points"
 """What a warning calls divisions of features and of fixed points."""
 
-
 EMPTY_REGIONS = "names of regions with nothing in them,"
 """What a warning calls names of labels that no face, edge or point has."""
-
 
 TOO_LARGE = "whose integers are too large for float64"
 """Why integers of 64 bits are left out."""

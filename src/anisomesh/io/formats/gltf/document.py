@@ -22,13 +22,13 @@ COMPONENTS = {5120: "i1", 5121: "u1", 5122: "i2", 5123: "u2", 5125: "u4", 5126: 
 WIDTHS = {"SCALAR": 1, "VEC2": 2, "VEC3": 3, "VEC4": 4}
 """Numbers of the components of accessors."""
 
-_MAX_ZEROS = 10_000_000  # rows of an accessor that no data are in the file for
+_MAX_ZEROS = 10_000_000  # rows of an accessor without data in the file
 
 
 class Document:
     """The JSON of a file, and access to its arrays.
 
-    ValueError if the file is no GLB, truncated, or requires an extension that is not supported.
+    ValueError if the file is not a GLB file, is truncated, or requires an extension that is not supported.
     """
 
     def __init__(self, data: bytes) -> None:

@@ -56,7 +56,7 @@ class _Scene:
         self._json = document.json
         self._cells = SurfaceCells()
         self._points: list[npt.NDArray[np.float64]] = [np.zeros((0, 3))]
-        self._n_points = self._n_lines = self._n_dots = 0  # lines and points that are primitives
+        self._n_points = self._n_lines = self._n_single_points = 0  # of primitives that are not triangles
         self._n_instances = 0
         self._coarser = _coarser_levels(self._json)
         self._carried = Carried()
@@ -85,7 +85,7 @@ class _Scene:
         remarks = []
         if not self._json.get("scenes") and any("mesh" in node for node in self._json.get("nodes", [])):
             remarks.append("it has no scene: read each of its meshes once, not moved by its nodes")
-        counts = [f"{n:,} {what}(s)" for n, what in ((self._n_lines, "line"), (self._n_dots, "point")) if n]
+        counts = [f"{n:,} {what}(s)" for n, what in ((self._n_lines, "line"), (self._n_single_points, "point")) if n]
         if counts:
             remarks.append(f"left out {' and '.join(counts)} that its meshes have besides triangles")
         hidden = self._hidden_meshes()
@@ -199,11 +199,14 @@ class _Scene:
             self._materials.append(np.full(len(triangles), material if isinstance(material, int) else NO_MATERIAL))
 
     def _count(self, primitive: dict[str, Any], mode: int) -> None:
-        """Count the lines or points of a primitive."""
-        accessor = primitive.get("indices", primitive["attributes"]["POSITION"])
+        """Count the lines or points of a primitive; by specification nothing is drawn of one without positions."""
+        attributes = primitive.get("attributes", {})
+        if "POSITION" not in attributes:
+            return
+        accessor = primitive.get("indices", attributes["POSITION"])
         n = index_of(self._document.item("accessors", accessor)["count"])
         if mode == _POINTS:
-            self._n_dots += n
+            self._n_single_points += n
         else:
             self._n_lines += n // 2 if mode == _LINES else max(n - (mode == _LINE_STRIP), 0)
 

@@ -228,7 +228,7 @@ def elements_4(numbers: NumberStream, elements: Elements, entities: Entities, *,
         width = 1 + _N_NODES[kind]
         rows = whole(numbers.take(count * width, "<i4" if is_40 else "size")).reshape(count, width)
         tags = np.column_stack([rows[:, 0], np.full(count, entity, dtype=np.int64)])
-        groups = np.array([entities.get((dimension, entity), [])] * count, dtype=np.int64).reshape(count, -1)
+        groups = np.tile(np.array(entities.get((dimension, entity), []), dtype=np.int64), (count, 1))
         blocks.append(Block(kind, rows[:, 1:], elements.take_numbers(count), tags, groups))
     found = sum(len(block.nodes) for block in blocks)
     if found != declared:

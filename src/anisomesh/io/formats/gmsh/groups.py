@@ -63,8 +63,13 @@ def each_once(blocks: Sequence[Block]) -> list[Block]:
     merged = []
     for kind in dict.fromkeys(block.kind for block in blocks):
         chosen = [block for block in blocks if block.kind == kind]
-        nodes, source, tags = (np.concatenate([block[k] for block in chosen]) for k in (1, 2, 3))
-        block = Block(kind, nodes, source, tags, stacked([block.groups for block in chosen]))
+        block = Block(
+            kind=kind,
+            nodes=np.concatenate([block.nodes for block in chosen]),
+            source=np.concatenate([block.source for block in chosen]),
+            tags=np.concatenate([block.tags for block in chosen]),
+            groups=stacked([block.groups for block in chosen]),
+        )
         candidates = _alike(block)
         merged.append(_joined(block, candidates) if len(candidates) else block)
     return merged

@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from anisomesh.io.formats.words import reals, shown, whole
+from anisomesh.io.formats.words import parsed_reals, shown, whole
 from anisomesh.io.polygons import Integers
 
 
@@ -80,7 +80,7 @@ class NumberStream:
             raise ValueError(f"truncated or malformed: it declares {count} numbers where fewer follow")
         if self._words is None:
             return np.frombuffer(self._bytes[start : self._position], dtype=dtype)
-        return reals(self._words[start : self._position])
+        return parsed_reals(self._words[start : self._position])
 
     def records(self, count: int, width: int = 3) -> tuple[Integers, npt.NDArray[np.float64]]:
         """Return the next rows of a tag and ``width`` coordinates: tags (count,), coordinates (count, width)."""

@@ -10,7 +10,7 @@ import re
 import numpy as np
 import numpy.typing as npt
 
-from anisomesh.io.carried import Carried
+from anisomesh.io.carried import Carried, listed
 from anisomesh.io.formats.gmsh.data import (
     name_regions,
     read_comments,
@@ -24,14 +24,13 @@ from anisomesh.io.formats.gmsh.elements import Elements, TagTable, elements_2_bi
 from anisomesh.io.formats.gmsh.groups import each_once
 from anisomesh.io.formats.gmsh.numbers import NumberStream
 from anisomesh.io.formats.gmsh.sections import COMMENTS, HEADER, GmshFile
-from anisomesh.io.formats.words import reals, shown, text_of, whole, with_line_feeds
+from anisomesh.io.formats.words import parsed_reals, shown, text_of, whole, with_line_feeds
 from anisomesh.io.polygons import Integers, PolygonSoup
 
 _PARAMETRIC = "ParametricNodes"
 _DATA = ("NodeData", "ElementData", "ElementNodeData")
 _GROUPS = ("PhysicalNames", "Entities", "PartitionedEntities")
 _READ = (HEADER, COMMENTS, *_GROUPS, "Nodes", _PARAMETRIC, "Elements", *_DATA)
-_MOST_SHOWN = 200  # characters of a remark
 
 
 def read_msh(data: bytes) -> PolygonSoup:
@@ -74,7 +73,7 @@ def read_msh(data: bytes) -> PolygonSoup:
             unit = "byte(s)" if stream.binary else "number(s)"
             carried.remarks.append(f"left out {stream.n_left} {unit} behind the {what} that it declares")
     if skipped := [other for other in dict.fromkeys(file.names) if other not in _READ]:
-        carried.remarks.append(f"left out its {', '.join(skipped)}"[:_MOST_SHOWN])
+        carried.remarks.append(f"left out its {listed(skipped)}")
     return elements.soup(points, carried, at_nodes)
 
 
@@ -107,7 +106,7 @@ def _nodes_2(numbers: NumberStream, *, parametric: bool) -> tuple[Integers, npt.
     rows = [line.split()[:4] for line in numbers.lines(count)]
     if any(len(row) < 4 for row in rows):
         raise ValueError("truncated: a line of the parametric nodes has fewer than 4 numbers")
-    table = reals([word for row in rows for word in row]).reshape(count, 4)
+    table = parsed_reals([word for row in rows for word in row]).reshape(count, 4)
     return whole(table[:, 0]), table[:, 1:]
 
 

@@ -17,7 +17,7 @@ _BEGIN = re.compile(rb"^\$(\w+)", re.MULTILINE)
 
 
 class GmshFile:
-    """A file by the names of its sections; what looks like a section within another one is none.
+    """A file by the names of its sections; what looks like a section within another one is not read as one.
 
     Parameters
     ----------

@@ -122,7 +122,7 @@ def _carried(
     if "Normals" in sections and "NormalAtVertices" not in sections:
         unknown.append("Normals")
     if unknown:
-        carried.remarks.append("left out its sections " + ", ".join(unknown)[:200])
+        carried.remarks.append(f"left out its sections {listed(unknown)}")
     return carried
 
 

@@ -15,7 +15,7 @@ import numpy.typing as npt
 
 from anisomesh.io.carried import Integers
 from anisomesh.io.formats.medit.keywords import END, KEYWORDS
-from anisomesh.io.formats.words import reals, text_of, whole, wholes
+from anisomesh.io.formats.words import parsed_integers, parsed_reals, text_of, whole
 
 PLANE, SPACE = 2, 3
 """Dimensions of files: numbers of coordinates of points."""
@@ -147,13 +147,13 @@ class _Text:
 
     def _integers(self, words: list[bytes]) -> npt.NDArray[Any]:
         try:
-            return wholes(words)
+            return parsed_integers(words)
         except ValueError:
             return self._numbers(words)
 
     def _numbers(self, words: list[bytes]) -> npt.NDArray[np.float64]:
         try:
-            return reals(words)
+            return parsed_reals(words)
         except ValueError as error:
             raise ValueError(f"malformed: the section {self.name} should give numbers: {error}") from None
 

@@ -7,7 +7,7 @@ import numpy as np
 from anisomesh.io.carried import COLOUR, NORMAL, UV, Array, Carried, Integers
 from anisomesh.io.formats.obj.lines import Lines
 from anisomesh.io.formats.region_names import also_named, divide, numbered_regions
-from anisomesh.io.formats.words import LINES_AT_ONCE, quick_numbers, shown, span, wholes, word_starts
+from anisomesh.io.formats.words import LINES_AT_ONCE, parsed_integers, quick_numbers, shown, span, word_starts
 
 SMOOTHING = "smoothing_group"
 """Name of the smoothing groups (``s``) as face data."""
@@ -88,7 +88,7 @@ def take_corner_data(file: Lines, words: list[list[bytes]] | Integers, sizes: In
     elif any(b"/" in word for row in words for word in row):
         with carried.optional("texture coordinates and normals"):
             parts = [[*word.split(b"/"), b"", b""][:3] for row in words for word in row]
-            indices = wholes([part or b"0" for row in parts for part in row]).reshape(-1, 3)
+            indices = parsed_integers([part or b"0" for row in parts for part in row]).reshape(-1, 3)
     for column, word, name, widths in ((1, b"vt", UV, (2, 3)), (2, b"vn", NORMAL, (3, 3))):
         chosen = indices[:, column]
         if not chosen.any():
@@ -135,7 +135,7 @@ def take_divisions(file: Lines, carried: Carried) -> None:
     with carried.optional("its smoothing groups"):
         given = file.of(b"s")
         texts = [file.rest(k) for k in given]
-        labels = wholes([b"0", *(b"0" if text in ("off", "") else text.encode() for text in texts)])
+        labels = parsed_integers([b"0", *(b"0" if text in ("off", "") else text.encode() for text in texts)])
         of_faces = labels[np.searchsorted(given, file.face_lines)]
         if of_faces.any():
             carried.cell_data[SMOOTHING] = of_faces
@@ -169,7 +169,7 @@ def _points_of_line(file: Lines, number: int, fewest: int) -> Integers:
     """Return the points of a line that lists them, from 0; ValueError if they are fewer or are not in the file."""
     line = file.lines[number]
     before = int(np.searchsorted(file.point_lines, number))
-    raw = wholes([text.partition(b"/")[0] for text in line.partition(b"#")[0].split()[1:]]).tolist()
+    raw = parsed_integers([text.partition(b"/")[0] for text in line.partition(b"#")[0].split()[1:]]).tolist()
     points = np.array([n - 1 if n > 0 else n + before for n in raw], dtype=np.int64)
     if len(points) < fewest or 0 in raw or (points < 0).any() or (points >= len(file.point_lines)).any():
         raise ValueError(f"it reads {shown(line)}")

@@ -8,7 +8,7 @@ import numpy as np
 import numpy.typing as npt
 
 from anisomesh.io.carried import Integers
-from anisomesh.io.formats.words import quick_table, reals, text_of
+from anisomesh.io.formats.words import parsed_reals, quick_table, text_of
 
 
 @dataclass(frozen=True, eq=False)
@@ -50,4 +50,4 @@ class Lines:
             return table
         rows = [self.lines[k].partition(b"#")[0].split() for k in chosen]
         width = min(map(len, rows)) - 1
-        return reals([word for row in rows for word in row[1 : 1 + width]]).reshape(len(rows), width)
+        return parsed_reals([word for row in rows for word in row[1 : 1 + width]]).reshape(len(rows), width)

@@ -11,7 +11,7 @@ import numpy.typing as npt
 
 from anisomesh.io.carried import Integers
 from anisomesh.io.formats.ply.header import Element
-from anisomesh.io.formats.words import reals, shown, wholes
+from anisomesh.io.formats.words import parsed_integers, parsed_reals, shown
 
 _BLANK = b"\0\t\n\r "
 
@@ -84,7 +84,9 @@ class TextBody:
     def _column(self, kind: str, starts: list[int], sizes: list[int]) -> PropertyValues:
         words = self.words
         flat = [word for start, size in zip(starts, sizes, strict=True) for word in words[start : start + size]]
-        return PropertyValues(reals(flat) if kind.startswith("f") else wholes(flat), np.array(sizes, dtype=np.int64))
+        return PropertyValues(
+            parsed_reals(flat) if kind.startswith("f") else parsed_integers(flat), np.array(sizes, dtype=np.int64)
+        )
 
     def _table(self, element: Element, wanted: Iterable[str]) -> dict[str, PropertyValues]:
         """Read an element of scalars."""
@@ -94,7 +96,7 @@ class TextBody:
             raise _truncated(element)
         self.position += count
         with _named(element):
-            table = reals(self.words[self.position - count : self.position]).reshape(element.count, width)
+            table = parsed_reals(self.words[self.position - count : self.position]).reshape(element.count, width)
         names = [prop.name for prop in element.properties]
         ones = np.ones(element.count, dtype=np.int64) if width else np.zeros(0, dtype=np.int64)
         return {name: PropertyValues(table[:, names.index(name)], ones) for name in wanted}

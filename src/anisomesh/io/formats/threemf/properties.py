@@ -30,10 +30,10 @@ class Properties:
         self._colours: list[Integers] = []
         self._coordinates: list[Array] = []
         self._textures: list[Integers] = []
-        self._n_mixed = self._n_beyond = 0  # faces with several materials, or with members that there are not
+        self._n_mixed = self._n_beyond = 0  # faces with several materials, or with missing members
         self._known_textures: dict[str, tuple[int, dict[str, str]]] = {}  # label and attributes by part
 
-    def add(self, name: str, rows: Integers, default: tuple[int, int], model: Resources, *, turned: bool) -> None:
+    def add(self, name: str, rows: Integers, default: tuple[int, int], model: Resources, *, inverted: bool) -> None:
         """Add an object.
 
         Parameters
@@ -46,7 +46,7 @@ class Properties:
             Group and member of triangles without.
         model
             Where groups are looked up.
-        turned
+        inverted
             Whether the corners are taken from last to first.
         """
         self._names.append(name)
@@ -57,7 +57,7 @@ class Properties:
         rows[without & (rows[:, 1] == NONE), 1] = default[1]
         rows[:, 2:] = np.where(rows[:, 2:] == NONE, rows[:, 1:2], rows[:, 2:])
         first = rows[:, 1].copy()
-        if turned:
+        if inverted:
             rows = rows[:, [0, 3, 2, 1]]
         labels, colours = np.zeros(len(rows), dtype=np.int64), np.full((len(rows), 3, 4), 255, dtype=np.int64)
         textures, coordinates = np.zeros(len(rows), dtype=np.int64), np.full((len(rows), 3, 2), np.nan)
@@ -104,7 +104,7 @@ class Properties:
             colours_of = {label_of[label]: colour for (_, colour), label in self._known.items()}
             carried.materials["display_colours"] = colours_of
         if self._n_beyond:
-            what = "materials, colours or texture coordinates that there are not"
+            what = "missing materials, colours or texture coordinates"
             carried.remarks.append(f"{self._n_beyond:,} face(s) refer to {what}")
         if self._n_mixed:
             carried.remarks.append(f"{self._n_mixed:,} face(s) have several materials and keep the first only")

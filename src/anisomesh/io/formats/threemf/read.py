@@ -21,9 +21,10 @@ from anisomesh.io.cells import SurfaceCells
 from anisomesh.io.formats.region_names import also_named
 from anisomesh.io.formats.threemf.extensions import check_required
 from anisomesh.io.formats.threemf.properties import MATERIAL, OBJECT, TEXTURES, Properties
-from anisomesh.io.formats.threemf.resources import CORE, NONE, Resources, number, reals, wholes
+from anisomesh.io.formats.threemf.resources import CORE, NONE, Resources, integer_attributes, number, real_attributes
 from anisomesh.io.formats.threemf.triangle_sets import TRIANGLE_SETS, SetsOfObjects, TriangleSet, take
 from anisomesh.io.formats.units import OF_3MF
+from anisomesh.io.formats.words import text_of
 from anisomesh.io.polygons import Integers, PolygonSoup
 
 ROOT = "3D/3dmodel.model"
@@ -123,7 +124,7 @@ class _Build:
             given = np.array(found.properties, dtype=np.int64).reshape(-1, 4)
             is_reflected = bool(np.linalg.det(matrix[:3]) < 0.0)
             resources = self.model(key[0]).resources
-            self._properties.add(found.name, given, found.default, resources, turned=is_reflected)
+            self._properties.add(found.name, given, found.default, resources, inverted=is_reflected)
             self._sets.add(found.sets, len(faces))
             if is_reflected:
                 faces = faces[:, ::-1]  # a reflection turns triangles inside out
@@ -162,7 +163,7 @@ def _root_name(archive: zipfile.ZipFile) -> str:
         for element in re.findall(rb"<[\w:]*Relationship\s[^>]*>", _entry(archive, "_rels/.rels")):
             target = re.search(rb"Target\s*=\s*[\"']([^\"']+)", element)
             if target and MODEL_TYPE.encode() in element:
-                return target[1].decode(errors="replace").lstrip("/")
+                return text_of(target[1]).lstrip("/")
     return ROOT
 
 
@@ -189,9 +190,9 @@ def _parse_model(text: bytes, name: str) -> _Model:
             if local in _SHAPES:
                 model.ignored.add(local)
         elif local == "vertex":
-            current.points.extend(reals(attributes, "x", "y", "z"))
+            current.points.extend(real_attributes(attributes, "x", "y", "z"))
         elif local == "triangle":
-            current.faces.extend(wholes(attributes, "v1", "v2", "v3"))
+            current.faces.extend(integer_attributes(attributes, "v1", "v2", "v3"))
             current.properties.extend(number(attributes.get(key, "")) for key in ("pid", "p1", "p2", "p3"))
         elif local == "object":
             current = model.objects.setdefault(attributes["id"], _Object())
@@ -228,7 +229,7 @@ def _matrix(text: str) -> npt.NDArray[np.float64]:
     words = text.split()
     if len(words) != 12:
         raise ValueError(f"malformed: a transformation has {len(words)} numbers; expected 12")
-    numbers = reals(dict(zip(_ENTRIES, words, strict=True)), *_ENTRIES)
+    numbers = real_attributes(dict(zip(_ENTRIES, words, strict=True)), *_ENTRIES)
     return np.array(numbers, dtype=np.float64).reshape(4, 3)
 
 

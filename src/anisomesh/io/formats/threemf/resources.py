@@ -23,7 +23,8 @@ TEXTURE_ATTRIBUTES = ("contenttype", "tilestyleu", "tilestylev", "filter")
 """What a texture says besides its number and the part of the archive with its image."""
 
 _LEFT_OUT = {"compositematerials", "multiproperties"}
-_LARGEST, _LONGEST = 2**62, 20  # integers; characters of a text in a message
+_LARGEST_ATTRIBUTE = 2**62
+_MAX_SHOWN = 20  # characters of an attribute in a message
 
 
 def number(text: str) -> int:
@@ -31,7 +32,7 @@ def number(text: str) -> int:
     return int(text) if text.isdecimal() and len(text) < 18 else NONE
 
 
-def reals(attributes: Mapping[str, str], *keys: str) -> list[float]:
+def real_attributes(attributes: Mapping[str, str], *keys: str) -> list[float]:
     """Return attributes that are real numbers; KeyError if one is missing, ValueError if it is not a number."""
     try:
         return [float(attributes[key]) for key in keys]
@@ -39,19 +40,19 @@ def reals(attributes: Mapping[str, str], *keys: str) -> list[float]:
         raise ValueError(_wrong(attributes, keys, "numbers")) from None
 
 
-def wholes(attributes: Mapping[str, str], *keys: str) -> list[int]:
+def integer_attributes(attributes: Mapping[str, str], *keys: str) -> list[int]:
     """Return attributes that are integers; KeyError if one is missing, ValueError if it is not an integer."""
     try:
         found = [int(attributes[key]) for key in keys]
     except ValueError:
         raise ValueError(_wrong(attributes, keys, "integers")) from None
-    if max(map(abs, found)) > _LARGEST:
+    if max(map(abs, found)) > _LARGEST_ATTRIBUTE:
         raise ValueError(_wrong(attributes, keys, "smaller integers"))
     return found
 
 
 def _wrong(attributes: Mapping[str, str], keys: Sequence[str], expected: str) -> str:
-    given = " ".join(f"{key}={attributes[key][:_LONGEST]!r}" for key in keys)
+    given = " ".join(f"{key}={attributes[key][:_MAX_SHOWN]!r}" for key in keys)
     return f"it reads {given}; expected {expected}"
 
 
@@ -116,6 +117,6 @@ class Resources:
             self._group = own
             self.texture_groups[own] = TextureGroup(number(attributes.get("texid", "")))
         elif element == "tex2coord" and self._group in self.texture_groups:
-            self.texture_groups[self._group].numbers.extend(reals(attributes, "u", "v"))
+            self.texture_groups[self._group].numbers.extend(real_attributes(attributes, "u", "v"))
         elif element in _LEFT_OUT:
             self.ignored.add(element)

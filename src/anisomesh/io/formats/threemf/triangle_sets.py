@@ -13,7 +13,7 @@ import numpy as np
 
 from anisomesh.io.carried import Carried, Integers
 from anisomesh.io.formats.region_names import add_set, also_named
-from anisomesh.io.formats.threemf.resources import wholes
+from anisomesh.io.formats.threemf.resources import integer_attributes
 
 TRIANGLE_SETS = "http://schemas.microsoft.com/3dmanufacturing/trianglesets/2021/07"
 
@@ -45,7 +45,8 @@ def take(sets: list[TriangleSet], element: str, attributes: dict[str, str]) -> N
     if element == "triangleset":
         sets.append(TriangleSet(attributes.get("name", "") or attributes.get("identifier", "")))
     elif element in ("ref", "refrange") and sets:
-        first, last = wholes(attributes, *(("index",) * 2 if element == "ref" else ("startindex", "endindex")))
+        keys = ("index", "index") if element == "ref" else ("startindex", "endindex")
+        first, last = integer_attributes(attributes, *keys)
         sets[-1].first.append(first)
         sets[-1].last.append(last)
 

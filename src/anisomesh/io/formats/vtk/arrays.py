@@ -17,6 +17,8 @@ from xml.etree.ElementTree import Element
 import numpy as np
 import numpy.typing as npt
 
+from anisomesh.io.formats.words import text_of
+
 _TYPES = {
     **{f"Int{8 * n}": f"i{n}" for n in (1, 2, 4, 8)},
     **{f"UInt{8 * n}": f"u{n}" for n in (1, 2, 4, 8)},
@@ -164,11 +166,11 @@ class ArrayReader:
 
 
 def _strings(codes: npt.NDArray[Any]) -> npt.NDArray[Any]:
-    """Return strings of UTF-8, each ended by a zero."""
+    """Return strings, each ended by a zero, decoded as :func:`~anisomesh.io.formats.words.text_of` does."""
     words = codes.astype(np.uint8).tobytes().split(b"\0")
     if words[-1]:
         raise ValueError("truncated: its last string does not end")
-    return np.array([word.decode("utf-8", errors="replace") for word in words[:-1]], dtype=np.str_)
+    return np.array([text_of(word) for word in words[:-1]], dtype=np.str_)
 
 
 def string_codes(words: npt.NDArray[Any]) -> npt.NDArray[np.uint8]:

@@ -11,6 +11,7 @@ import numpy as np
 from anisomesh.io.carried import NORMAL, UV, Array, Carried
 from anisomesh.io.formats.region_names import label_of
 from anisomesh.io.formats.vtk.arrays import ArrayReader
+from anisomesh.io.formats.words import text_of
 
 NAMES_OF_REGIONS = "regions of "
 """Beginning of the names of field data that make cell data a division.
@@ -148,7 +149,7 @@ def names_of_regions(fields: dict[str, Array], carried: Carried) -> list[dict[st
             found = [k for k, beginning in enumerate(beginnings) if name.startswith(beginning)]
             if found and values.dtype == np.uint8:
                 key = name.removeprefix(beginnings[found[0]])
-                names[found[0]][key] = _labels(values.tobytes().decode("utf-8", errors="replace"))
+                names[found[0]][key] = _labels(text_of(values.tobytes()))
             else:
                 others[name] = values
     if others:

@@ -1,4 +1,4 @@
-"""A mark on a folder that a batch is at work in it, which ends with the process, however it ends."""
+"""A lock on the folder of a batch, so that one works in it at a time; it ends with the process, however that ends."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ _WITHOUT_LOCKS = (errno.ENOLCK, errno.ENOSYS, errno.ENOTSUP, errno.EOPNOTSUPP)  
 
 
 @contextmanager
-def at_work(folder: Path, shard: tuple[int, int] | None) -> Iterator[None]:
+def locked_folder(folder: Path, shard: tuple[int, int] | None) -> Iterator[None]:
     """Hold a folder for a batch, or for a shard of one beside the others; the folder is made if missing.
 
     Parameters
