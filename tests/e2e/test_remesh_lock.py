@@ -214,6 +214,21 @@ def test_a_line_through_the_corner_of_a_locked_face_is_one_path(n_vertices):
     assert result.warnings == ()
 
 
+@pytest.mark.parametrize("seed", [0, 3])
+def test_a_line_that_comes_to_a_straight_side_of_locked_faces_reaches_it(seed):
+    """Regression: near the corners of the side its end did not count as one, and the last edge was lost in the fit."""
+    surface = open_patch(lambda x, y: 0.1 * np.sin(1.5 * x + 1.5), n=11)
+    middle = middles(surface)
+    block = np.flatnonzero((np.abs(middle[:, :2]) < 0.28).all(axis=1))
+    row = np.flatnonzero(np.abs(surface.points[:, 1] + 1.0 / 11.0) < 1e-9)
+    row = row[np.argsort(surface.points[row, 0])]
+    line = np.stack([row[:-1], row[1:]], axis=1)
+    mesh = Mesh(surface=surface, features=line, fixed_faces=block)
+    result = anisomesh.remesh(mesh, n_vertices=60, seed=seed)
+    ends = result.surface.points[result.mesh.features][..., 0]
+    assert np.abs(np.diff(ends, axis=1)).sum() == pytest.approx(2.0, abs=1e-9)
+
+
 def test_too_few_vertices_are_refused():
     with pytest.raises(
         OptionError, match=r"50 vertices are asked for, and the locked regions and points to keep have 81"

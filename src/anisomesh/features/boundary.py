@@ -44,7 +44,8 @@ class BoundaryLoops(FeaturePolylines):
             Points of the surface where a crease meets the boundary, or a vertex is wanted: always corners.
         """
         turn, fine = self.turns(reach), self.turns(_FINE_SCALE * reach)
-        turn[np.isin(self.tail, sharp_ends)] = 180.0
+        always = np.isin(self.tail, sharp_ends)
+        turn[always] = 180.0
         candidate = np.flatnonzero(turn > CORNER_TURN)
         low, high = self.limits[self.polyline[candidate]].T
         near = np.minimum(reach, _MAX_TURN_SCALE * (high - low)) * np.where(
@@ -58,7 +59,7 @@ class BoundaryLoops(FeaturePolylines):
             chosen.append(int(candidate[k]))
             apart = np.abs(self.start[candidate] - self.start[candidate[k]])
             apart = np.minimum(apart, (high - low) - apart)
-            taken |= (self.polyline[candidate] == self.polyline[candidate[k]]) & (apart < near)
+            taken |= (self.polyline[candidate] == self.polyline[candidate[k]]) & (apart < near) & ~always[candidate]
         segments = np.array(sorted(chosen), dtype=np.int64)
         return segments, turn[segments]
 
