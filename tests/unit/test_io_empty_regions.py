@@ -78,7 +78,13 @@ FILES = {
     "none.msh": (GROUPS.replace("1 2 2 4 4 1", "1 2 2 0 4 1"), "physical 'tip', 'rim', 'inlet', 'wall'"),
     "a.ply": (PLY, "part 'inlet'"),
     "a.glb": (
-        glb({"nodes": [{"name": "first", "mesh": 0}, {"name": "second", "mesh": 1}], "materials": [{"name": "red"}]}),
+        glb(
+            {
+                "nodes": [{"name": "first", "mesh": 0}, {"name": "second", "mesh": 1}],
+                "materials": [{"name": "red"}],
+                "meshes": [{"primitives": [{"attributes": {"POSITION": 0}}]}, {"primitives": []}],
+            }
+        ),
         "node 'second'",
     ),
     "named.glb": (

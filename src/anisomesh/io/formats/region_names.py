@@ -164,7 +164,7 @@ def add_set(carried: Carried, division: str, name: str, chosen: Integers, n_cell
     division
         Name of the first division of such sets; further ones have a number. Cells in no set have the label 0.
     name
-        Name of the set.
+        Name of the set, empty for a region without a name.
     chosen
         Numbers of its cells (n,).
     n_cells
@@ -175,8 +175,9 @@ def add_set(carried: Carried, division: str, name: str, chosen: Integers, n_cell
         key = division if number == 1 else f"{division} {number}"
         found = carried.divisions.setdefault(key, Division(labels=np.zeros(n_cells, dtype=np.int64)))
         if not found.labels[chosen].any():
-            label = len(found.names) + 1
+            label = int(found.labels.max(initial=0)) + 1
             found.labels[chosen] = label
-            found.names[label] = name
+            if name:
+                found.names[label] = name
             return
         number += 1

@@ -163,8 +163,16 @@ def _carry_meshio(mesh: Any, carried: Carried) -> None:
                 np.asarray(() if rows is None else rows, dtype=np.int64) + start
                 for rows, start in zip(blocks, first, strict=False)
             ]
-            add_set(carried, CELL_SET, name, np.concatenate(rows), int(first[-1]))
+            chosen = np.concatenate(rows)
+            if len(chosen) == 0:
+                also_named(carried, CELL_SET, [name])
+            else:
+                add_set(carried, CELL_SET, name, chosen, int(first[-1]))
+    are_faces = [np.full(len(block.data), _MESHIO_SURFACE.fullmatch(block.type) is not None) for block in mesh.cells]
     for name, division in list(carried.divisions.items()):
         if name.startswith(CELL_SET):
-            del carried.divisions[name]
-            carried.add_data_of_all_cells(name, division.labels, [division.names] * _N_DIMENSIONS)
+            if not division.labels[np.concatenate(are_faces)].any():
+                del carried.divisions[name]
+                also_named(carried, name, division.names.values())
+            for marked in (carried.fixed_points, carried.lines):
+                marked.divide(name, division.labels, division.names)

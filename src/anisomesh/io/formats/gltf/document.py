@@ -12,7 +12,7 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from anisomesh.io.formats.gltf.extensions import check_compression, check_required
+from anisomesh.io.formats.gltf.extensions import REQUIRED, check_compression, check_required, extensions
 
 JSON_CHUNK, BINARY_CHUNK = b"JSON", b"BIN\0"
 
@@ -44,7 +44,7 @@ class Document:
         if not isinstance(self.json, dict):
             raise ValueError("malformed: its JSON is not an object")
         self._binary = chunks.get(BINARY_CHUNK, b"")
-        check_required(self.json.get("extensionsRequired", []))
+        check_required(extensions(self.json, REQUIRED))
 
     def item(self, kind: str, index: Any) -> dict[str, Any]:
         """Return a node, mesh, accessor or other member of a list of the JSON; ValueError if there is none."""
@@ -70,7 +70,7 @@ class Document:
         if "bufferView" in found:
             rows = self._rows(found["bufferView"], found.get("byteOffset", 0), count, kind, width)
         else:
-            check_compression(self.json.get("extensionsUsed", []))  # the data are there, if this says so
+            check_compression(extensions(self.json, "extensionsUsed"))  # the data are there, if this says so
             if count > _MAX_ZEROS:
                 raise ValueError(f"malformed: an accessor declares {count} rows without data")
             rows = np.zeros((count, width), dtype=kind)

@@ -15,7 +15,7 @@ from anisomesh.io.carried import Carried, listed
 from anisomesh.io.cells import SurfaceCells, strip_triangles
 from anisomesh.io.formats.gltf.attributes import Attributes, read_attributes
 from anisomesh.io.formats.gltf.document import Document, index_of
-from anisomesh.io.formats.gltf.extensions import COPIES, LEVELS
+from anisomesh.io.formats.gltf.extensions import COPIES, LEVELS, REQUIRED, descriptive, extensions
 from anisomesh.io.formats.gltf.materials import read_materials
 from anisomesh.io.formats.region_names import also_named, divide, is_number
 from anisomesh.io.formats.units import OF_GLB
@@ -83,17 +83,44 @@ class _Scene:
     def _left_out(self) -> tuple[str, ...]:
         """Return what of the geometry is left out, a line each."""
         remarks = []
-        if not self._json.get("scenes") and any("mesh" in node for node in self._json.get("nodes", [])):
+        if not self._json.get("scenes") and self._moves_meshes():
             remarks.append("it has no scene: read each of its meshes once, not moved by its nodes")
         counts = [f"{n:,} {what}(s)" for n, what in ((self._n_lines, "line"), (self._n_single_points, "point")) if n]
         if counts:
-            remarks.append(f"left out {' and '.join(counts)} that its meshes have besides triangles")
+            alone = [repr(name) for name in map(self._node_name, self._without_triangles()) if name]
+            of_them = f", everything in {listed(alone)}" if alone else ""
+            remarks.append(f"left out {' and '.join(counts)} that its meshes have besides triangles{of_them}")
         hidden = self._hidden_meshes()
         if hidden:
             remarks.append(f"left out {len(hidden)} mesh(es) that are not in its scene: {listed(hidden)}")
         if self._coarser:
             remarks.append(f"read its finest level of detail; coarser ones left out ({LEVELS}): {len(self._coarser)}")
         return tuple(remarks)
+
+    def _moves_meshes(self) -> bool:
+        """Return whether nodes, which are in no scene, move a mesh or show one several times."""
+        nodes = self._json.get("nodes", [])
+        read = [node for k, node in enumerate(nodes) if k not in self._coarser]
+        shown = [node["mesh"] for node in read if "mesh" in node]
+        if len(set(shown)) < len(shown):
+            return True
+        below = [node for node in read if COPIES in node.get("extensions", {}) or (_matrix(node) != np.eye(4)).any()]
+        done: set[int] = set()
+        for node in below:  # which grows
+            if "mesh" in node:
+                return True
+            new = set(node.get("children", [])) - done - self._coarser
+            below += [self._document.item("nodes", child) for child in new]
+            done |= new
+        return False
+
+    def _without_triangles(self) -> list[int]:
+        """Return the nodes that are read, or meshes of a file without scenes, that have lines and points only."""
+        modes = {
+            node: [primitive.get("mode", TRIANGLES) for primitive in self._document.item("meshes", mesh)["primitives"]]
+            for node, mesh in self._seen.items()
+        }
+        return [node for node, given in modes.items() if given and max(given) < TRIANGLES]
 
     def _hidden_meshes(self) -> list[str]:
         """Return the names, or numbers, of meshes that the scene does not have, not even as coarser levels."""
@@ -118,7 +145,8 @@ class _Scene:
         with carried.optional("its nodes"):
             used = np.unique(nodes).tolist()
             texts = [self._node_name(label) for label in used]
-            also_named(carried, NODE, map(self._node_name, self._seen))
+            bare = self._without_triangles()  # which a line of the geometry names
+            also_named(carried, NODE, [self._node_name(node) for node in self._seen if node not in bare])
             if any(texts) or len(used) > 1:
                 divide(carried, NODE, nodes, texts, used)
         with carried.optional("its materials"):
@@ -132,7 +160,7 @@ class _Scene:
                     names = {k: text for k, text in enumerate(texts) if text and k in used}
                     carried.add_cell_data(MATERIAL, materials, names=names)
                     carried.materials["gltf"] = read_materials(self._document)
-        left = [name for name in _NOT_KEPT if self._json.get(name)]
+        left = [name for name in _NOT_KEPT if self._json.get(name)] + descriptive(extensions(self._json, REQUIRED))
         primitives = [part for mesh in self._json.get("meshes", []) for part in mesh["primitives"]]
         left += ["morph targets"] if any("targets" in part for part in primitives) else []
         if left:

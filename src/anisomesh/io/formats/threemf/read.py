@@ -19,7 +19,7 @@ from anisomesh.attributes.model import UNIT
 from anisomesh.io.carried import Carried, listed
 from anisomesh.io.cells import SurfaceCells
 from anisomesh.io.formats.region_names import also_named
-from anisomesh.io.formats.threemf.extensions import check_required
+from anisomesh.io.formats.threemf.extensions import check_required, check_resolution
 from anisomesh.io.formats.threemf.properties import MATERIAL, OBJECT, TEXTURES, Properties
 from anisomesh.io.formats.threemf.resources import CORE, NONE, Resources, integer_attributes, number, real_attributes
 from anisomesh.io.formats.threemf.triangle_sets import TRIANGLE_SETS, SetsOfObjects, TriangleSet, take
@@ -29,7 +29,7 @@ from anisomesh.io.polygons import Integers, PolygonSoup
 
 ROOT = "3D/3dmodel.model"
 MODEL_TYPE = "http://schemas.microsoft.com/3dmanufacturing/2013/01/3dmodel"
-_SHAPES = {"beamlattice", "booleanshape", "levelset"}
+_SHAPES = {"beamlattice", "booleanshape", "levelset", "slicestack"}
 _ENTRIES = tuple(f"m{row}{column}" for row in range(4) for column in range(3))  # of a transformation
 _DEEPEST_COMPONENTS = 100
 _MAX_OBJECTS = 100_000
@@ -195,6 +195,7 @@ def _parse_model(text: bytes, name: str) -> _Model:
             current.faces.extend(integer_attributes(attributes, "v1", "v2", "v3"))
             current.properties.extend(number(attributes.get(key, "")) for key in ("pid", "p1", "p2", "p3"))
         elif local == "object":
+            check_resolution(attributes)
             current = model.objects.setdefault(attributes["id"], _Object())
             current.name = attributes.get("name", "")
             current.default = (number(attributes.get("pid", "")), number(attributes.get("pindex", "")))

@@ -52,7 +52,7 @@ def integer_attributes(attributes: Mapping[str, str], *keys: str) -> list[int]:
 
 
 def _wrong(attributes: Mapping[str, str], keys: Sequence[str], expected: str) -> str:
-    given = " ".join(f"{key}={attributes[key][:_MAX_SHOWN]!r}" for key in keys)
+    given = " ".join(f"{key}={attributes[key][:_MAX_SHOWN]!r}" for key in dict.fromkeys(keys))
     return f"it reads {given}; expected {expected}"
 
 

@@ -23,16 +23,22 @@ DIVISION = "triangle_set"
 
 @dataclass
 class TriangleSet:
-    """A set of triangles of an object: its name, and the first and last numbers of ranges of triangles."""
+    """A set of triangles of an object: its name, first and last numbers of ranges of triangles, and what is wrong."""
 
     name: str
     first: array[int] = field(default_factory=lambda: array("q"))
     last: array[int] = field(default_factory=lambda: array("q"))
+    fault: str = ""
 
     def rows(self, count: int) -> Integers:
         """Return the numbers of its triangles (n,), ValueError if one is not among the triangles of its object."""
+        if self.fault:
+            raise ValueError(self.fault)
         first, last = np.array(self.first, dtype=np.int64), np.array(self.last, dtype=np.int64)
-        if len(first) and (first.min() < 0 or last.max() >= count or (last < first).any()):
+        if (last < first).any():
+            k = int(np.argmax(last < first))
+            raise ValueError(f"it has a range that begins with {first[k]} and ends with {last[k]}")
+        if len(first) and (first.min() < 0 or last.max() >= count):
             raise ValueError(f"it refers to a triangle beyond the {count} triangles of its object")
         change = np.zeros(count + 1, dtype=np.int64)
         np.add.at(change, first, 1)
@@ -46,9 +52,15 @@ def take(sets: list[TriangleSet], element: str, attributes: dict[str, str]) -> N
         sets.append(TriangleSet(attributes.get("name", "") or attributes.get("identifier", "")))
     elif element in ("ref", "refrange") and sets:
         keys = ("index", "index") if element == "ref" else ("startindex", "endindex")
-        first, last = integer_attributes(attributes, *keys)
-        sets[-1].first.append(first)
-        sets[-1].last.append(last)
+        try:
+            first, last = integer_attributes(attributes, *keys)
+        except KeyError as error:
+            sets[-1].fault = f"a part of it lacks the attribute {error}"
+        except ValueError as error:
+            sets[-1].fault = str(error)
+        else:
+            sets[-1].first.append(first)
+            sets[-1].last.append(last)
 
 
 class SetsOfObjects:
@@ -67,7 +79,7 @@ class SetsOfObjects:
     def carry(self, carried: Carried) -> None:
         """Add the divisions into sets."""
         for each, count, starts in self._found.values():
-            with carried.optional(f"the triangle set {each.name!r}"):
+            with carried.optional(f"the triangle set {each.name!r}" if each.name else "a triangle set without a name"):
                 chosen = (each.rows(count) + np.array(starts)[:, None]).ravel()
                 if len(chosen) == 0:
                     also_named(carried, DIVISION, [each.name])
