@@ -3,6 +3,7 @@
 import json
 import os
 import signal
+import sys
 from pathlib import Path
 
 import pytest
@@ -15,7 +16,8 @@ from anisomesh.batch.manifest import read_manifest
 from anisomesh.batch.options import plain_options
 from anisomesh.batch.rows import Results
 from anisomesh.batch.running import Batch
-from anisomesh.cli.ending import exit_at_sigterm
+from anisomesh.cli.ending import ENDED_BY_SIGTERM, exit_at_sigterm
+from anisomesh.cli.main import main
 from anisomesh.errors import AnisomeshError, OptionError
 from anisomesh.execution.engine import Work
 from conftest import torus_arrays, write_obj
@@ -68,6 +70,24 @@ def test_what_a_manifest_says_is_not_dropped(folder, name, lines, message):
     """Regression: of a column or key that is given twice one value was dropped."""
     with pytest.raises(OptionError, match=message):
         read_manifest(lines_of(folder / name, *lines), TARGET)
+
+
+@pytest.mark.parametrize(
+    ("name", "lines"),
+    [("j.csv", ["input,n_vertices", "a.obj,1e400"]), ("j.jsonl", ['{"input": "a.obj", "n_vertices": 1e400}'])],
+)
+def test_a_number_too_large_is_repeated_as_it_is_written(folder, name, lines):
+    """Regression: it was repeated as inf."""
+    with pytest.raises(OptionError, match="n_vertices = '1e400'"):
+        checked(read_manifest(lines_of(folder / name, *lines), {}), str(folder / "out"))
+
+
+def test_a_manifest_in_another_encoding_is_said_in_plain_words(folder):
+    """Regression: the message was the one of the decoder."""
+    (folder / "j.csv").write_bytes("input,n_vertices\ngrün.obj,60\n".encode("latin-1"))
+    with pytest.raises(OptionError) as error:
+        read_manifest(folder / "j.csv", {})
+    assert str(error.value) == f"{folder / 'j.csv'}: cannot be read as text in UTF-8; save it in UTF-8"
 
 
 @pytest.mark.parametrize("name", ["n_vertices", "seed", "threads", "lloyd_iterations", "max_iterations"])
@@ -269,6 +289,17 @@ def test_shards_share_a_folder_and_the_same_one_does_not_run_twice(folder):
 
 
 @pytest.mark.skipif(os.name == "nt", reason="no locks")
+def test_shards_of_another_number_of_shards_do_not_share_a_folder(folder):
+    """Regression: shard 1 of 3 began beside shards of 2, and did some of their jobs again."""
+    for held, other in (((2, 2), (1, 3)), ((1, 3), (1, 2))):
+        message = rf"shard {held[0]} of {held[1]} is at work.* shard {other[0]} of {other[1]}"
+        with locked_folder(folder, held), pytest.raises(AnisomeshError, match=message), locked_folder(folder, other):
+            pass
+    with locked_folder(folder, (1, 2)):
+        pass
+
+
+@pytest.mark.skipif(os.name == "nt", reason="no locks")
 def test_a_line_that_another_batch_is_writing_is_not_cut_off(folder):
     jobs, out = jobs_of([str(folder / "a.obj")], TARGET), folder / "out"
     first = batch(jobs, out)
@@ -306,3 +337,15 @@ def test_sigterm_ends_a_batch_as_an_exit_which_ends_its_workers(run_cli, folder,
         run_cli("batch", "a.obj", "-n", 30, "-o", "out", "--workers", 0, "--no-thumbnails", cwd=folder)
     assert (error.value.code, ended) == (143, [True])
     assert signal.getsignal(signal.SIGTERM) is before
+
+
+def test_a_command_that_sigterm_ends_says_so(monkeypatch, capsys):
+    """Regression: nothing was on the terminal."""
+
+    def terminated(*_, **__):
+        sys.exit(ENDED_BY_SIGTERM)
+
+    monkeypatch.setattr("anisomesh.cli.main.app", terminated)
+    with pytest.raises(SystemExit):
+        main(["batch"])
+    assert capsys.readouterr().err == "anisomesh: ended by SIGTERM\n"

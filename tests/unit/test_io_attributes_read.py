@@ -248,7 +248,6 @@ def test_gmsh(tmp_path, caplog):
     said = [record.getMessage().partition(": ")[2] for record in caplog.records]
     assert said == [
         "left out a further time step of the data 'flow'",
-        "left out its Periodic",
     ]
 
 

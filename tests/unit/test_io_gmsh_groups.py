@@ -86,8 +86,8 @@ def test_elements_are_joined_as_a_dictionary_joins_them():
     rng = np.random.default_rng(3)
     nodes, entities, group = rng.integers(1, 5, (400, 3)), rng.integers(1, 3, 400), rng.integers(1, 4, 400)
     tags = np.column_stack([np.arange(400), entities])
-    (found,) = each_once([ElementBlock(2, nodes, np.arange(400), tags, group[:, None])])
-    expected = {}  # by nodes, entity and how often the group was there before
+    (found,), repeats = each_once([ElementBlock(2, nodes, np.arange(400), tags, group[:, None])])
+    repeated, expected = set(), {}  # by nodes, entity and how often the group was there before
     for k in range(400):
         key = (*sorted(nodes[k].tolist()), int(entities[k]))
         copies = expected.setdefault(key, [])
@@ -96,8 +96,43 @@ def test_elements_are_joined_as_a_dictionary_joins_them():
             copies.append((k, [group[k]]))
         else:
             home[1].append(group[k])
+            repeated.add((k, home[0]))
     rows = {first: set(groups) for copies in expected.values() for first, groups in copies}
     assert dict(zip(found.source.tolist(), ({*row} - {0} for row in found.groups.tolist()), strict=True)) == rows
+    assert {tuple(pair) for pair in repeats.tolist()} == repeated
+    assert len(repeats) == len(repeated) == 400 - len(rows)
+
+
+@pytest.mark.parametrize("last", [5, 6, None])
+def test_data_of_repeated_elements_that_differ_are_named(tmp_path, caplog, last):
+    """Regression: they vanished without a line."""
+    elements = "$Elements\n3\n1 2 2 1 1 10 20 30\n2 2 2 2 1 30 10 20\n3 2 2 1 1 10 30 40\n$EndElements\n"
+    head = f"{HEAD_2}{NODES_2}{elements}"
+    rows, at_nodes = {1: 5, 3: 7} | ({} if last is None else {2: last}), {1: "5 6 7", 3: "1 2 3"}
+    if last is not None:
+        at_nodes[2] = f"7 {last} {11 - last}"  # of the same nodes in another order
+    data = "".join(f"{k} {value}\n" for k, value in rows.items())
+    corners = "".join(f"{k} 3 {values}\n" for k, values in at_nodes.items())
+    mesh = read(
+        tmp_path,
+        f'{head}$ElementData\n1\n"q"\n1\n0\n3\n0\n1\n{len(rows)}\n{data}$EndElementData\n'
+        f'$ElementNodeData\n1\n"c"\n1\n0\n3\n0\n1\n{len(rows)}\n{corners}$EndElementNodeData\n',
+    )
+    assert mesh.face_data["q"].tolist() == [5, 7]
+    said = [record.getMessage().partition(": ")[2] for record in caplog.records]
+    lost = "left out data 'q' of 1 element(s) that repeat others, whose data differ"
+    assert said == ([lost] if last == 6 else [])
+
+
+@pytest.mark.parametrize("values", ["7 5 8", None])
+def test_data_at_nodes_of_repeated_elements_that_differ_are_named(tmp_path, caplog, values):
+    """Regression: they vanished without a line, also if only the second one has any."""
+    elements = "$Elements\n3\n1 2 2 1 1 10 20 30\n2 2 2 2 1 30 10 20\n3 2 2 1 1 10 30 40\n$EndElements\n"
+    rows = ["1 3 5 6 7", f"2 3 {values}"] if values else ["2 3 5 6 7", "3 3 1 2 3"]
+    table = "\n".join(rows)
+    data = f'$ElementNodeData\n1\n"c"\n1\n0\n3\n0\n1\n2\n{table}\n$EndElementNodeData\n'
+    read(tmp_path, f"{HEAD_2}{NODES_2}{elements}{data}")
+    assert "left out data 'c' of 1 element(s) that repeat others, whose data differ" in caplog.text
 
 
 def test_each_group_is_in_one_division_as_a_whole():
@@ -118,7 +153,7 @@ def test_groups_that_overlap_too_many_others_are_named(tmp_path, caplog):
     elements = "$Elements\n1 1 1 1\n2 1 2 1\n1 10 20 30\n$EndElements\n"
     mesh = read(tmp_path, HEAD_4 + entities + NODES_4 + elements)
     assert [regions.labels[0] for name, regions in mesh.regions.items()] == list(range(1, 9))
-    assert "left out 2 physical group(s) that overlap too many others" in caplog.text
+    assert "left out the physical group(s) 9, 10, which overlap too many others" in caplog.text
 
 
 def test_parts_of_entities_have_the_groups_of_their_own_or_of_their_entity(tmp_path, caplog):
@@ -150,7 +185,7 @@ def test_sections_that_are_not_read_and_rows_behind_the_counts_are_named(tmp_pat
     assert said == [
         "left out 2 number(s) behind the nodes that it declares",
         "left out 8 number(s) behind the elements that it declares",
-        "left out its Foo",
+        "left out its sections Foo",
     ]
 
 

@@ -59,6 +59,9 @@ LEFT_OUT = {  # name: content and what the log says
         "left out what follows the rows that its section Triangles declares",
     ),
     "two sections.mesh": (MEDIT + EDGES + EDGES + END, "left out all but the last of its sections Edges"),
+    "text behind the end.mesh": (MEDIT + END + "blah blah\n", "left out what follows its End"),
+    "numbers behind the end.mesh": (MEDIT + END + "1 2\n", "left out what follows its End"),
+    "unknown sections.mesh": (MEDIT + "Blah Blah\n" + END, "left out its sections Blah"),
     "normals of nothing.mesh": (MEDIT + "Normals\n1\n0 0 1\n" + END, "left out its sections Normals"),
     "required point.mesh": (
         MEDIT + "RequiredVertices\n1\n9\n" + END,
@@ -69,7 +72,7 @@ LEFT_OUT = {  # name: content and what the log says
 LEFT_OUT |= {
     f"{name} without edges.mesh": (
         f"{MEDIT}{name}\n1\n5\n{END}",
-        f"left out the section {name}: the file has none of these",
+        f"left out the section {name}: it has no Edges",
     )
     for name in ("RequiredEdges", "Ridges")
 }
@@ -83,7 +86,7 @@ LEFT_OUT |= {
 LEFT_OUT |= {
     "required quadrilaterals.mesh": (
         MEDIT + "RequiredQuadrilaterals\n1\n1\n" + END,
-        "left out the section RequiredQuadrilaterals: the file has none of these",
+        "left out the section RequiredQuadrilaterals: it has no Quadrilaterals",
     ),
     "required triangles.mesh": (
         MEDIT + "RequiredTriangles\n1\n3\n" + END,
@@ -98,6 +101,14 @@ def test_what_is_left_out_is_named(tmp_path, caplog, name):
     (tmp_path / name).write_bytes(content if isinstance(content, bytes) else content.encode())
     assert load_mesh(tmp_path / name).surface.n_faces == 2
     assert [message in record.getMessage() for record in caplog.records].count(True) == 1, caplog.text
+
+
+@pytest.mark.parametrize("name", ["text behind the end.mesh", "unknown sections.mesh"])
+def test_what_is_left_out_of_medit_files_is_named_in_one_line(tmp_path, caplog, name):
+    """Regression: a word twice gave two lines, and a file with text behind its End was said to have no End."""
+    (tmp_path / name).write_text(LEFT_OUT[name][0])
+    load_mesh(tmp_path / name)
+    assert len(caplog.records) == 1
 
 
 WHOLE = {

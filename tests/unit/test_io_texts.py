@@ -180,6 +180,55 @@ def test_any_white_space_may_separate_the_words_of_a_text_stl_file(tmp_path, nam
     assert mesh.regions["solid"].names == {**({1: name} if name else {}), 2: "b"}
 
 
+@pytest.mark.parametrize("begin", [" ", "\t", "  "])
+@pytest.mark.parametrize("outer", [" ", "\n", "\n  "])
+@pytest.mark.parametrize("name", ["a", "two words", ""])
+def test_the_first_facet_may_be_on_the_line_of_its_solid(tmp_path, name, begin, outer):
+    """Regression: such a file was refused as truncated if the corners were on further lines."""
+    first, second = (FACET.format(k).replace("\nouter", f"{outer}outer") for k in (0, 2))
+    text = f"solid {name}{begin}{first}{FACET.format(3)}endsolid {name}\nsolid b{begin}{second}endsolid b\n"
+    (tmp_path / "a.stl").write_text(text)
+    mesh = load_mesh(tmp_path / "a.stl")
+    assert mesh.regions["solid"].labels.tolist() == [1, 1, 2]
+    assert mesh.regions["solid"].names == {**({1: name} if name else {}), 2: "b"}
+
+
+@pytest.mark.parametrize("end", ["\n", "\t"])
+@pytest.mark.parametrize("name", ["a", "two words", ""])
+def test_a_solid_may_begin_on_the_line_on_which_another_ends(tmp_path, name, end):
+    """Regression: the second solid became part of the first one unless the whole file was on one line."""
+    text = f"solid {name}\n{FACET.format(0).strip()}{end}endsolid {name} solid my b\n{FACET.format(2)}endsolid my b\n"
+    (tmp_path / "a.stl").write_text(text)
+    mesh = load_mesh(tmp_path / "a.stl")
+    assert mesh.regions["solid"].labels.tolist() == [1, 2]
+    assert mesh.regions["solid"].names == {**({1: name} if name else {}), 2: "my b"}
+
+
+@pytest.mark.parametrize(
+    ("name", "text"),
+    [
+        ("endsolid", "end_solid"),
+        ("My EndSolid x", "My End_Solid x"),
+        ("my solid part", "my solid part"),
+        ("facet normal 1 2 3 outer rim", "facet_normal 1 2 3 outer rim"),
+        ("outer facet normal", "outer facet normal"),
+    ],
+)
+def test_names_of_solids_are_written_so_that_others_read_the_file(tmp_path, caplog, name, text):
+    """Regression: trimesh refused a file with a solid called endsolid."""
+    save(Mesh(surface=BOX, regions={"solid": Regions(LABELS, {1: name, 2: "b"})}), tmp_path / "a.stl")
+    assert ("some characters of 1 name(s)" in caplog.text) == (name != text)
+    mesh = load_mesh(tmp_path / "a.stl")
+    assert mesh.regions["solid"].names == {1: text, 2: "b"}
+    assert np.bincount(mesh.regions["solid"].labels).tolist() == [0, BOX.n_faces // 2, BOX.n_faces // 2]
+    trimesh = pytest.importorskip("trimesh")
+    scene = trimesh.load_scene(tmp_path / "a.stl")
+    assert {each: len(part.faces) for each, part in scene.geometry.items()} == {
+        text: BOX.n_faces // 2,
+        "b": BOX.n_faces // 2,
+    }
+
+
 def test_a_text_stl_file_on_one_line_that_is_cut_off_is_refused(tmp_path):
     text = f"solid a\n{FACET.format(0)}{FACET.format(3)}endsolid a\n".replace("\n", " ")
     for k in range(30, len(text.removesuffix("endfacet endsolid a ")), 3):
@@ -210,6 +259,46 @@ def test_a_file_with_the_extension_of_another_format_is_recognised(tmp_path, suf
     (tmp_path / f"a{suffix}").write_bytes(content)
     with pytest.raises(MeshFileError, match=message):
         load_mesh(tmp_path / f"a{suffix}")
+
+
+ONE_LINE = f"solid a {FACET.format(0)}endsolid a".replace("\n", " ").encode()
+BINARY = b"solid of 1 triangle".ljust(80) + (1).to_bytes(4, "little") + bytes(50)
+MEDIT_BINARY = np.array([1, 2, 3, 20, 3, 54, 0], dtype="<i4").tobytes()
+ALSO_MISTAKEN = [
+    (".obj", ONE_LINE, "a text STL file"),
+    (".off", ONE_LINE, "a text STL file"),
+    (".ply", BINARY, "a binary STL file; give it the extension .stl"),
+    (".obj", BINARY, "a binary STL file"),
+    (".off", f"# old\n\n{POINTS}f 1 2 3\n".encode(), "an OBJ file; give it the extension .obj"),
+    (".ply", b"mtllib a.mtl\r\no part\r\n", "an OBJ file"),
+    (".msh", b"v -1.5 0 0\n", "an OBJ file"),
+    (".stl", b"# old\nOFF\n3 1 0\n", "an OFF file"),
+    (".obj", b"OFF3 1 0\n0 0 0\n", "an OFF file"),
+    (".ply", b"# old\nMeshVersionFormatted 2\n", "a MEDIT file"),
+    (".msh", MEDIT_BINARY, "a MEDIT file"),
+    (".stl", codecs.BOM_UTF16_LE + ONE_LINE.decode().encode("utf-16-le"), "text in UTF-16"),
+    (".stl", codecs.BOM_UTF16_BE + ONE_LINE.decode().encode("utf-16-be"), "text in UTF-16"),
+]
+
+
+@pytest.mark.parametrize(("suffix", "content", "message"), ALSO_MISTAKEN)
+def test_other_formats_are_recognised_in_each_of_their_forms(tmp_path, suffix, content, message):
+    """Regression: STL on one line and OBJ in files of other extensions, and text STL in UTF-16, were not."""
+    (tmp_path / f"a{suffix}").write_bytes(content)
+    with pytest.raises(MeshFileError, match=f"it seems to be {message}"):
+        load_mesh(tmp_path / f"a{suffix}")
+
+
+@pytest.mark.parametrize("mark", [b"\x1a", b"\x1a\r\n", b"\0\0\0", b"\n\x1a\0\n"])
+@pytest.mark.parametrize("suffix", [".obj", ".off", ".ply", ".stl", ".mesh", ".msh"])
+def test_marks_of_the_end_of_a_file_are_not_content(tmp_path, caplog, suffix, mark):
+    """Regression: a line was said to be left out behind the faces."""
+    path = written(tmp_path, suffix)
+    caplog.clear()
+    expected = load_mesh(path)
+    path.write_bytes(path.read_bytes() + mark)
+    assert_equal(expected, load_mesh(path))
+    assert caplog.text == ""
 
 
 def test_text_in_utf_16_is_recognised_in_both_byte_orders(tmp_path):

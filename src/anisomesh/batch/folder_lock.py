@@ -5,6 +5,7 @@ from __future__ import annotations
 import errno
 import logging
 import os
+import re
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
@@ -19,6 +20,7 @@ except ImportError:  # Windows
 
 logger = logging.getLogger(__name__)
 
+_LOCK_OF_SHARD = re.compile(r"\.batch\.(\d+)-of-(\d+)\.lock")
 _WITHOUT_LOCKS = (errno.ENOLCK, errno.ENOSYS, errno.ENOTSUP, errno.EOPNOTSUPP)  # of some network file systems
 
 
@@ -36,15 +38,15 @@ def locked_folder(folder: Path, shard: tuple[int, int] | None) -> Iterator[None]
     Raises
     ------
     AnisomeshError
-        If a batch is at work there, or the same shard of one.
+        If a batch is at work there, the same shard of one, or one of another number of shards.
     MeshFileError
         If the folder cannot be made or written.
 
     Notes
     -----
     The locks (flock) are of the open files, so nothing is left of a process that was killed but empty hidden files.
-    Shards share the lock of the folder, and each has one of its own. Windows has no such locks, and on file systems
-    without them a warning says so.
+    Shards share the lock of the folder, and each has one of its own, which others try that have another number of
+    shards. Windows has no such locks, and on file systems without them a warning says so.
     """
     wanted = [(".batch.lock", shard is None, "a batch, or a shard of one, is")]
     if shard is not None:
@@ -56,9 +58,28 @@ def locked_folder(folder: Path, shard: tuple[int, int] | None) -> Iterator[None]
             held.append(_opened(folder / name))
             if not _locked(held[-1], folder, alone=alone):
                 raise AnisomeshError(f"{folder}: {what} at work in this folder; wait for its end, or name another")
+        if shard is not None and fcntl is not None:
+            _check_others(folder, shard)
         yield
     finally:
         for file in held:
+            os.close(file)
+
+
+def _check_others(folder: Path, shard: tuple[int, int]) -> None:
+    """Raise AnisomeshError if a shard of another number of shards, which has some of the same jobs, is at work."""
+    for path in sorted(folder.glob(".batch.*-of-*.lock")):
+        found = _LOCK_OF_SHARD.fullmatch(path.name)
+        if found is None or int(found[2]) == shard[1]:
+            continue
+        file = _opened(path)
+        try:
+            if not _locked(file, folder, alone=False):
+                raise AnisomeshError(
+                    f"{folder}: shard {found[1]} of {found[2]} is at work in this folder, and shard {shard[0]} of "
+                    f"{shard[1]} has some of its jobs; wait for its end, or name another"
+                )
+        finally:
             os.close(file)
 
 

@@ -5,6 +5,7 @@ from __future__ import annotations
 import csv
 import io
 import json
+import math
 from collections.abc import Iterator, Sequence
 from functools import partial
 from pathlib import Path
@@ -51,7 +52,7 @@ def read_manifest(path: Path, options: Options, *, output_format: str | None = N
     except OSError as error:
         raise OptionError(f"{path}: {why_unreadable(path, error)}; expected a manifest") from error
     except UnicodeDecodeError as error:
-        raise OptionError(f"{path} cannot be read as text: {error}") from error
+        raise OptionError(f"{path}: cannot be read as text in UTF-8; save it in UTF-8") from error
     jobs = []
     for where, row in readers[path.suffix.lower()](str(path), text):
         check_keys(where, row, _KNOWN_COLUMNS)
@@ -101,7 +102,7 @@ def _json_rows(name: str, text: str) -> Iterator[tuple[str, dict[str, Any]]]:
         if line.strip():
             where = f"{name}, line {number}"
             try:
-                row = json.loads(line, object_pairs_hook=partial(_object, where))
+                row = json.loads(line, object_pairs_hook=partial(_object, where), parse_float=_real)
             except OptionError:
                 raise
             except (ValueError, RecursionError) as error:  # also a number of too many digits
@@ -151,11 +152,17 @@ def _check_once(where: str, names: Sequence[str]) -> None:
             raise OptionError(f"{where}: {name} is given twice")
 
 
+def _real(text: str) -> float | str:
+    """Return a number, or its text if it is too large for float64, so that messages repeat what the file says."""
+    number = float(text)
+    return text if math.isinf(number) and any(map(str.isdigit, text)) else number
+
+
 def _value(column: str, text: str) -> Any:
     """Return the value in a cell of a CSV file: a number, true or false, or a text."""
     if column in _TEXTS:
         return text
-    for kind in (int, float):
+    for kind in (int, _real):
         try:
             return kind(text)
         except ValueError:

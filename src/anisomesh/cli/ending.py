@@ -8,6 +8,9 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 from types import FrameType
 
+ENDED_BY_SIGTERM = 128 + signal.SIGTERM
+"""Exit code of a process that is ended by this signal."""
+
 
 @contextmanager
 def exit_at_sigterm() -> Iterator[None]:
@@ -22,5 +25,5 @@ def exit_at_sigterm() -> Iterator[None]:
         signal.signal(signal.SIGTERM, signal.SIG_DFL if before is None else before)
 
 
-def _exit(number: int, _frame: FrameType | None) -> None:
-    sys.exit(128 + number)
+def _exit(_number: int, _frame: FrameType | None) -> None:
+    sys.exit(ENDED_BY_SIGTERM)

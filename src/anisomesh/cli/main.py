@@ -14,6 +14,7 @@ from typing import Annotated
 import typer
 
 from anisomesh.cli import batch, benchmark, dataset, demo, evaluate, train
+from anisomesh.cli.ending import ENDED_BY_SIGTERM
 from anisomesh.cli.figures import group as figure
 from anisomesh.cli.info.command import command as info_command
 from anisomesh.cli.log import logs
@@ -94,6 +95,10 @@ def main(arguments: list[str]) -> int:
         return _fail("out of memory; ask for fewer vertices or samples, or use a machine with more memory", 1)
     except (KeyboardInterrupt, typer.Abort):
         status = 130
+    except SystemExit as ended:
+        if ended.code == ENDED_BY_SIGTERM:
+            print("anisomesh: ended by SIGTERM", file=sys.stderr)
+        raise
     if status == 130:
         print("anisomesh: interrupted", file=sys.stderr)
     return int(status)

@@ -20,7 +20,7 @@ from anisomesh.io.formats.obj.write import obj_bytes
 from anisomesh.io.formats.off import off_bytes, read_off
 from anisomesh.io.formats.ply.read import read_ply
 from anisomesh.io.formats.ply.write import ply_bytes
-from anisomesh.io.formats.stl import read_stl, stl_bytes
+from anisomesh.io.formats.stl import is_binary_stl, read_stl, stl_bytes
 from anisomesh.io.formats.threemf.read import read_3mf
 from anisomesh.io.formats.threemf.write import threemf_bytes
 from anisomesh.io.formats.vtk.read import read_vtp, read_vtu
@@ -61,17 +61,19 @@ TEXT_FORMATS = (".obj", ".off", ".ply", ".msh", ".mesh")
 MESH_FORMATS = tuple(READERS)
 """Extensions of files that are read and written, in lower case with the dot."""
 
+_COMMENTS = rb"(?:\s|#[^\r\n]*[\r\n])*"
 _BEGINNINGS = (  # what a file begins with, the extensions that it may have, and what it is called in messages
     (rb"ply\s", (".ply",), "a PLY file"),
     (rb"\s*\$(MeshFormat|Comments)\b", (".msh",), "a Gmsh file (MSH)"),
     (rb"glTF", (".glb",), "a GLB file"),
     (rb"PK\x03\x04", (".3mf",), "a 3MF file or another archive"),
-    (rb"\s*MeshVersionFormatted", (".mesh", ".meshb"), "a MEDIT file"),
-    (rb"\s*(ST)?C?N?OFF\s", (".off",), "an OFF file"),
-    (rb"\s*solid\b.*\n\s*facet\s", (".stl",), "a text STL file"),
+    (_COMMENTS + rb"MeshVersionFormatted|\x01\0\0\0[\x01-\x04]\0\0\0", (".mesh", ".meshb"), "a MEDIT file"),
+    (_COMMENTS + rb"(ST)?C?N?OFF[\s\d]", (".off",), "an OFF file"),
+    (rb"(?s)\s*solid\b.*?\bfacet\s+normal\b", (".stl",), "a text STL file"),
     (rb"\s*(<\?xml[^>]*>\s*)?<VTKFile", (".vtu", ".vtp"), "a VTK file (VTU or VTP)"),
     (rb"# vtk DataFile", (), "a legacy VTK file (.vtk); save it as VTU or VTP"),
     (rb"\s*<(!DOCTYPE )?html\b", (), "a web page"),
+    (_COMMENTS + rb"(mtllib\s|[go]\s|v\s+[-+.\d])", (".obj",), "an OBJ file"),
 )
 
 
@@ -82,7 +84,7 @@ def mistaken_format(data: bytes, suffix: str) -> str:
     for beginning, suffixes, name in _BEGINNINGS:
         if suffix not in suffixes and re.match(beginning, data.removeprefix(BYTE_ORDER_MARK), re.IGNORECASE):
             return f"{name}; give it the extension {suffixes[0]}" if suffixes else name
-    return ""
+    return "a binary STL file; give it the extension .stl" if suffix != ".stl" and is_binary_stl(data) else ""
 
 
 def known_suffix(path: str | Path, file_format: str | None, *, is_stream: bool = False) -> str:

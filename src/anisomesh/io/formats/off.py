@@ -9,7 +9,7 @@ import numpy as np
 
 from anisomesh.attributes.model import Mesh
 from anisomesh.io.carried import COLOUR, NORMAL, UV, Array, Carried
-from anisomesh.io.formats.words import coordinates, integers, parsed_reals, shown, span
+from anisomesh.io.formats.words import coordinates, integers, parsed_reals, shown, span, without_end_marks
 from anisomesh.io.holding.corners import continuous_corner_data
 from anisomesh.io.holding.losses import Losses
 from anisomesh.io.holding.normals import has_direction, with_all_normals
@@ -25,7 +25,7 @@ def read_off(data: bytes) -> PolygonSoup:
     -----
     The counts may follow the word OFF on its line, without a space too, as in the files of ModelNet.
     """
-    rows = [(k, line.partition(b"#")[0].strip()) for k, line in enumerate(data.splitlines())]
+    rows = [(k, line.partition(b"#")[0].strip()) for k, line in enumerate(without_end_marks(data).splitlines())]
     numbers = np.array([k for k, line in rows if line], dtype=np.int64)
     lines = [line for _, line in rows if line]
     head = re.match(rb"(ST)?C?N?OFF(?=[\s\d]|$)\s*(.*)", lines[0]) if lines else None

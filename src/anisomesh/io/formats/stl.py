@@ -28,11 +28,16 @@ _HEADER_BYTES = 84  # of a binary file: 80 of text and the number of triangles
 _TEXT = re.compile(rb"\s*solid.*?\bfacet\s+normal\b", re.DOTALL | re.IGNORECASE)
 _FACET = re.compile(rb"\bfacet\s+normal\b")
 _SOLID = re.compile(rb"solid\b")
-_SOLID_NAME = re.compile(
-    rb"[^\n]*?(?=\bfacet[ \t]+normal(?:[ \t]+[^\s]+){3}[ \t]+outer\b|\n|\Z)"
-)  # facets may be on its line
+_BEGIN_OF_FACET = rb"\bfacet\s+normal(?:\s+\S+){3}\s+outer\b"
+_SOLID_NAME = re.compile(rb"[^\n]*?(?=" + _BEGIN_OF_FACET + rb"|\n|\Z)")  # the first facet may begin on its line
 _END_OF_FACET = re.compile(rb"\bendfacet\b", re.IGNORECASE)
-_END_AND_SOLID = re.compile(rb"^([ \t]*endsolid\b[^\n]*?)[ \t](?=solid\b)", re.IGNORECASE | re.MULTILINE)
+_FACET_AND_END = re.compile(rb"(\bendloop\s+endfacet)[ \t]+(?=endsolid\b)", re.IGNORECASE)
+_END_AND_SOLID = re.compile(
+    rb"^([ \t]*endsolid\b[^\n]*?)[ \t](?=solid\b[^\n]*?(?:\n\s*)?" + _BEGIN_OF_FACET + rb")",
+    re.IGNORECASE | re.MULTILINE,
+)
+_END_IN_NAME = re.compile(r"(?<=end)(?=solid)", re.IGNORECASE)
+_FACET_IN_NAME = re.compile(r"(?<=\bfacet) (?=normal( \S+){3} outer\b)", re.IGNORECASE)
 _FACET_LINES = "facet normal %r %r %r\n outer loop\n" + 3 * "  vertex %r %r %r\n" + " endloop\nendfacet\n"
 _TRIANGLE = np.dtype([("normal", "<f4", 3), ("corners", "<f4", (3, 3)), ("attribute", "<u2")])
 
@@ -47,8 +52,7 @@ def read_stl(data: bytes) -> PolygonSoup:
     remark, unless they are triangles that the file does not count. Solids of text are a division; the two bytes per
     triangle of binary files are face data.
     """
-    declared = int.from_bytes(data[80:84], "little") if len(data) >= _HEADER_BYTES else -1
-    end = _HEADER_BYTES + declared * _TRIANGLE.itemsize
+    declared, end = _declared(data)
     remarks: list[str] = []
     carried = Carried()
     if len(data) != end and _TEXT.match(data.removeprefix(BYTE_ORDER_MARK)):
@@ -76,12 +80,24 @@ def read_stl(data: bytes) -> PolygonSoup:
     return PolygonSoup.from_array(corners[points], inverse.reshape(-1, 3), remarks=remarks, carried=carried)
 
 
+def _declared(data: bytes) -> tuple[int, int]:
+    """Return how many triangles a binary file declares, -1 if it is too short, and the size that fits them."""
+    declared = int.from_bytes(data[80:84], "little") if len(data) >= _HEADER_BYTES else -1
+    return declared, _HEADER_BYTES + declared * _TRIANGLE.itemsize
+
+
+def is_binary_stl(data: bytes) -> bool:
+    """Return whether the size of a file is the one of a binary STL file with as many triangles as it declares."""
+    declared, end = _declared(data)
+    return declared > 0 and len(data) == end
+
+
 def _in_lines(data: bytes) -> bytes:
     """Return a text whose solids begin on lines of their own, which any white space may separate in the file."""
     text = with_line_feeds(data)
-    if text.count(b"\n") >= text.lower().count(b"endfacet"):
-        return text
-    return _END_AND_SOLID.sub(rb"\1\n", _END_OF_FACET.sub(b"endfacet\n", text))
+    if text.count(b"\n") < text.lower().count(b"endfacet"):
+        text = _END_OF_FACET.sub(b"endfacet\n", text)
+    return _END_AND_SOLID.sub(rb"\1\n", _FACET_AND_END.sub(rb"\1\n", text))
 
 
 def _take_names(words: bytearray) -> Iterator[tuple[int, slice]]:
@@ -137,7 +153,7 @@ def stl_bytes(mesh: Mesh, losses: Losses) -> bytes:
     losses.add("materials", *mesh.materials)
     losses.features(mesh)
     if found is not None:
-        texts = region_texts(found[1], losses, in_words)
+        texts = region_texts(found[1], losses, _written)
         return _text(mesh, found[1], texts).encode("utf-8", errors="replace")
     rows = np.zeros(len(faces), dtype=_TRIANGLE)
     with np.errstate(over="ignore"):
@@ -150,6 +166,11 @@ def stl_bytes(mesh: Mesh, losses: Losses) -> bytes:
     return b"binary STL".ljust(_HEADER_BYTES - 4) + len(faces).to_bytes(4, "little") + rows.tobytes()
 
 
+def _written(name: str) -> str:
+    """Return the name of a solid without what would be read as its end or as a facet."""
+    return _FACET_IN_NAME.sub("_", _END_IN_NAME.sub("_", in_words(name)))
+
+
 def _text(mesh: Mesh, solids: Regions, texts: dict[int, str]) -> str:
     """Return a text file with a solid for each region, in the order of their labels."""
     points, faces = mesh.surface.points, mesh.surface.faces
@@ -157,5 +178,6 @@ def _text(mesh: Mesh, solids: Regions, texts: dict[int, str]) -> str:
     parts = []
     for (label,), chosen in by_label(solids.labels):
         rows = format_rows(_FACET_LINES, table[chosen])
-        parts.append(f"solid {texts[label]}\n{rows}endsolid {texts[label]}\n")
+        at_end = "" if SOLID in texts[label].lower() else f" {texts[label]}"  # where some would see another begin
+        parts.append(f"solid {texts[label]}\n{rows}endsolid{at_end}\n")
     return "".join(parts)

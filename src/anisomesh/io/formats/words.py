@@ -16,6 +16,7 @@ BYTE_ORDER_MARK = b"\xef\xbb\xbf"  # of UTF-8
 LINES_AT_ONCE = 100_000
 """Lines that are parsed at once, which limits memory."""
 
+_END_MARKS = b"\0\x1a\t\n\r "
 _MOST_CHARACTERS = 60  # characters of a text that a message repeats
 _SPACE = ord(" ")  # codes up to it are white space, or make numbers malformed
 _LARGEST_WHOLE = 2.0**53  # beyond it, not every integer has a float64
@@ -42,6 +43,11 @@ def span(counts: set[int]) -> str:
 def with_line_feeds(data: bytes) -> bytes:
     """Return a text with line feeds at the ends of its lines, of which some may be carriage returns."""
     return data.replace(b"\r\n", b"\n").replace(b"\r", b"\n") if b"\r" in data else data
+
+
+def without_end_marks(data: bytes) -> bytes:
+    """Return a text without white space, end-of-file marks of DOS and null bytes at its end."""
+    return data.rstrip(_END_MARKS)
 
 
 def parsed_reals(words: Sequence[bytes]) -> npt.NDArray[np.float64]:

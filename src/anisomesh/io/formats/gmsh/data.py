@@ -144,17 +144,23 @@ def _tags(stream: NumberStream) -> list[int]:
     return tags
 
 
-def read_data(file: GmshFile, numbers: NumberStream, carried: Carried, tags: tuple[Integers, Integers]) -> None:
-    """Read $NodeData and $ElementData, of the first time step each; ``tags`` are of the nodes and of the elements."""
-    for name, into, rows in (
-        ("NodeData", carried.point_data, tags[0]),
-        ("ElementData", carried.cell_data, tags[1]),
+def read_data(
+    file: GmshFile, numbers: NumberStream, carried: Carried, tags: tuple[Integers, Integers], repeats: Integers
+) -> None:
+    """Read $NodeData and $ElementData, of the first time step each.
+
+    ``tags`` are of the nodes and of the elements, ``repeats`` as of
+    :func:`~anisomesh.io.formats.gmsh.groups.each_once`.
+    """
+    for name, into, rows, repeated in (
+        ("NodeData", carried.point_data, tags[0], repeats[:0]),
+        ("ElementData", carried.cell_data, tags[1], repeats),
     ):
-        into |= _first_steps(file, name, carried, partial(_data, numbers, rows))
+        into |= _first_steps(file, name, carried, partial(_data, numbers, rows, _Repeated(repeated, carried)))
 
 
 def read_data_at_corners(
-    file: GmshFile, numbers: NumberStream, carried: Carried, tags: Integers, places: Integers
+    file: GmshFile, numbers: NumberStream, carried: Carried, tags: tuple[Integers, Integers], repeats: Integers
 ) -> dict[str, Array]:
     """Return $ElementNodeData of the first time step by name, with a row for each node of each element.
 
@@ -164,10 +170,13 @@ def read_data_at_corners(
         The file, and a stream of numbers of its type.
     carried
         Remarks are added here.
-    tags, places
+    tags
         Tags (n,) of the elements, and number of the first node and number of nodes (n, 2) of each.
+    repeats
+        As of :func:`~anisomesh.io.formats.gmsh.groups.each_once`.
     """
-    return _first_steps(file, "ElementNodeData", carried, partial(_data_at_corners, numbers, tags, places))
+    read = partial(_data_at_corners, numbers, *tags, _Repeated(repeats, carried))
+    return _first_steps(file, "ElementNodeData", carried, read)
 
 
 def _are_integers(values: Array) -> bool:
@@ -181,6 +190,25 @@ class _Head(NamedTuple):
     width: int
     n_rows: int
     body: bytes
+
+
+class _Repeated(NamedTuple):
+    """Elements that are left out since they repeat others, by the tags (n, 2) of both; says what is lost of them."""
+
+    tags: Integers
+    carried: Carried
+
+    def compare(self, name: str, given: Integers, values: npt.NDArray[np.float64]) -> None:
+        """Add a remark if data (n, k, width) of elements with given tags (n,) differ; nodes may be in another order."""
+        place, has = _places(given, self.tags[:, 0])
+        first, known = _places(given, self.tags[:, 1])
+        if has.any():
+            mine, other = np.sort(values[place[has]], axis=1), np.sort(values[first[has]], axis=1)
+            is_same = ((mine == other) | (np.isnan(mine) & np.isnan(other))).all(axis=(1, 2)) & known[has]
+            if n_lost := np.count_nonzero(~is_same):
+                self.carried.remarks.append(
+                    f"left out data {name!r} of {n_lost} element(s) that repeat others, whose data differ"
+                )
 
 
 def _first_steps(file: GmshFile, section: str, carried: Carried, read: Callable[[_Head], Array]) -> dict[str, Array]:
@@ -216,24 +244,28 @@ def _head(section: bytes) -> _Head:
     return _Head(name, width, count, b"\n".join(lines[at:]))
 
 
-def _data(numbers: NumberStream, tags: Integers, head: _Head) -> Array:
+def _data(numbers: NumberStream, tags: Integers, repeated: _Repeated, head: _Head) -> Array:
     """Return the rows of data, NaN where there are none."""
     given, rows = numbers.of(head.body).records(head.n_rows, head.width)
     place, known = _places(given, tags)
     if not known.any():
         raise ValueError(f"{head.name!r} has no row for what is in the file")
+    repeated.compare(head.name, given, rows[:, None])
     table = np.full((len(tags), head.width), np.nan)
     table[known] = rows[place[known]]
     return table[:, 0] if head.width == 1 else table
 
 
-def _data_at_corners(numbers: NumberStream, tags: Integers, places: Integers, head: _Head) -> Array:
+def _data_at_corners(
+    numbers: NumberStream, tags: Integers, places: Integers, repeated: _Repeated, head: _Head
+) -> Array:
     """Return the rows of data at the nodes of elements, NaN where there are none."""
     table = np.full((int(places.sum(axis=1).max(initial=0)), head.width), np.nan)
     found = False
     for given, rows in numbers.of(head.body).blocks(head.n_rows, head.width):
         place, known = _places(given, tags)
         found |= bool(known.any())
+        repeated.compare(head.name, given, rows)
         for k in range(rows.shape[1]):
             chosen = np.flatnonzero(known & (places[:, 1] > k))
             table[places[chosen, 0] + k] = rows[place[chosen], k]

@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from anisomesh.io.carried import Array, Carried, Integers, Marked
+from anisomesh.io.carried import Array, Carried, Integers, Marked, listed
 from anisomesh.io.cells import N_CORNERS, Shape, SurfaceCells
 from anisomesh.io.formats.gmsh.groups import PHYSICAL, Block, division_name, separate, stacked
 from anisomesh.io.formats.gmsh.numbers import NumberStream
@@ -142,7 +142,8 @@ class Elements:
         blocks = [block for block in self._blocks if block.kind in kinds]
         divisions, left_out = separate(stacked([block.groups for block in blocks]))
         if left_out:
-            carried.remarks.append(f"left out {len(left_out)} physical group(s) that overlap too many others")
+            numbers = listed([str(group) for group in left_out])
+            carried.remarks.append(f"left out the physical group(s) {numbers}, which overlap too many others")
         labels = np.zeros((len(divisions), self._count), dtype=np.int64)
         labels[:, _sources(blocks)] = divisions
         return list(labels)

@@ -54,13 +54,15 @@ def stacked(groups: Sequence[Integers]) -> Integers:
     return np.concatenate([np.zeros((0, width), dtype=np.int64), *padded])
 
 
-def each_once(blocks: Sequence[Block]) -> list[Block]:
+def each_once(blocks: Sequence[Block]) -> tuple[list[Block], Integers]:
     """Return elements with all physical groups that they are in, each once.
+
+    Also return the tags (n, 2) of the elements that are left out, and of the ones that they repeat.
 
     Version 2 has an element once for each of its groups. Elements are the same if they have a type, an entity and all
     nodes in common, but different groups; the first one is kept.
     """
-    merged = []
+    merged, repeats = [], [np.zeros((0, 2), dtype=np.int64)]
     for kind in dict.fromkeys(block.kind for block in blocks):
         chosen = [block for block in blocks if block.kind == kind]
         block = Block(
@@ -71,8 +73,11 @@ def each_once(blocks: Sequence[Block]) -> list[Block]:
             groups=stacked([block.groups for block in chosen]),
         )
         candidates = _alike(block)
-        merged.append(_joined(block, candidates) if len(candidates) else block)
-    return merged
+        if len(candidates):
+            block, pairs = _joined(block, candidates)
+            repeats.append(pairs)
+        merged.append(block)
+    return merged, np.concatenate(repeats)
 
 
 def _alike(block: Block) -> Integers:
@@ -92,8 +97,8 @@ def _hash(numbers: Integers) -> npt.NDArray[np.uint64]:
     return mixed
 
 
-def _joined(block: Block, rows: Integers) -> Block:
-    """Return a block with the elements of these rows joined that are the same."""
+def _joined(block: Block, rows: Integers) -> tuple[Block, Integers]:
+    """Return a block with the elements of these rows joined that are the same, and tags as of :func:`each_once`."""
     keys = np.column_stack([np.sort(block.nodes[rows], axis=1), block.tags[rows, 1]])
     key = np.unique(keys, axis=0, return_inverse=True)[1].reshape(-1)
     group = block.groups[rows, 0]
@@ -108,7 +113,8 @@ def _joined(block: Block, rows: Integers) -> Block:
     groups[first, slot] = group
     kept = np.ones(len(block.nodes), dtype=bool)
     kept[rows[slot > 0]] = False
-    return Block(block.kind, block.nodes[kept], block.source[kept], block.tags[kept], groups[kept])
+    pairs = np.column_stack([block.tags[rows, 0], block.tags[first, 0]])[slot > 0]
+    return Block(block.kind, block.nodes[kept], block.source[kept], block.tags[kept], groups[kept]), pairs
 
 
 def _place_among_equal(*keys: Integers) -> Integers:

@@ -51,29 +51,29 @@ def read_msh(data: bytes) -> PolygonSoup:
     else:
         tags, points = _nodes_4(nodes, interleaved=version == "4.0")
     table = TagTable(tags)
-    elements = Elements(table)
+    elements, repeats = Elements(table), np.zeros((0, 2), dtype=np.int64)
     if not is_2:
         entities = read_entities(file, numbers, carried, is_40=version == "4.0")
         blocks = elements_4(section, elements, entities, is_40=version == "4.0")
     else:
-        blocks = each_once((elements_2_binary if section.binary else elements_2_text)(section, elements))
+        blocks, repeats = each_once((elements_2_binary if section.binary else elements_2_text)(section, elements))
     for block in blocks:
         elements.add(block)
     named = read_comments(file, carried)
     cell_numbers = elements.carry(carried, named, read_unlabelled(file))
     read_physical_names(file, carried)
-    read_data(file, numbers, carried, (tags, cell_numbers))
+    read_data(file, numbers, carried, (tags, cell_numbers), repeats)
     for each, values in carried.cell_data.items():
         carried.note_marks(each, values)
     name_regions(carried, named, elements.surface)
     of_surface = cell_numbers[elements.surface]
-    at_nodes = read_data_at_corners(file, numbers, carried, of_surface, elements.node_places)
+    at_nodes = read_data_at_corners(file, numbers, carried, (of_surface, elements.node_places), repeats)
     for what, stream in (("nodes", nodes), ("elements", section)):
         if stream.n_left:
             unit = "byte(s)" if stream.binary else "number(s)"
             carried.remarks.append(f"left out {stream.n_left} {unit} behind the {what} that it declares")
-    if skipped := [other for other in dict.fromkeys(file.names) if other not in _READ]:
-        carried.remarks.append(f"left out its {listed(skipped)}")
+    if skipped := [other for other in dict.fromkeys(file.names) if other not in _READ and file.has_content(other)]:
+        carried.remarks.append(f"left out its sections {listed(skipped)}")
     return elements.soup(points, carried, at_nodes)
 
 

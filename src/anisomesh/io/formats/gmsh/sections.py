@@ -57,6 +57,10 @@ class GmshFile:
             if other == name:
                 yield self._data[start:stop]
 
+    def has_content(self, name: str) -> bool:
+        """Return whether a section of a name has more in it than white space or a count of 0."""
+        return any(content.strip(b"\0\t\r\n ") not in (b"", b"0") for content in self.named(name))
+
     def first(self, name: str) -> bytes:
         """Return the content of the first section of a name; ValueError if there is none."""
         content = next(self.named(name), None)

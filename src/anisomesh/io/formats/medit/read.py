@@ -41,7 +41,7 @@ def read_medit(data: bytes) -> PolygonSoup:
     required triangles and quadrilaterals fixed faces.
     References of vertices are point data, or a division of the fixed points if no other vertices have one.
     """
-    dimension, sections, ends = read_sections(data)
+    dimension, sections, ends, is_followed = read_sections(data)
     points, of_points, cells = [np.zeros((0, SPACE))], [np.zeros(0, dtype=np.int64)], SurfaceCells()
     references, others = [np.zeros(0, dtype=np.int64)], dict[str, Section]()
     numbers: dict[str, list[Integers]] = {}  # of the cells of each section
@@ -63,20 +63,22 @@ def read_medit(data: bytes) -> PolygonSoup:
         elif name.startswith(_VOLUMES):
             cells.ignore(name)
         else:
-            repeated += [name] if name in others else []
+            repeated += [name] if name in others and (name in _USED or name in _MARKED_FACES) else []
             others[name] = section
     required = {name: others.pop(name) for name in _MARKED_FACES if name in others}
     carried = _carried(others, np.concatenate(references), np.concatenate(of_points), dimension)
     for name, section in required.items():
         with carried.optional(f"the section {name}"):
             of_section = np.concatenate(numbers.get(_MARKED_FACES[name], [np.zeros(0, dtype=np.int64)]))
-            chosen = of_section[_within(marks(section), len(of_section))]
+            chosen = of_section[_within(marks(section), len(of_section), _MARKED_FACES[name])]
             carried.fixed_cells = np.concatenate([carried.fixed_cells, chosen])
     if repeated:
         carried.remarks.append(f"left out all but the last of its sections {listed(list(dict.fromkeys(repeated)))}")
     for section in sections:
         if section.is_read and section.n_left:
             carried.remarks.append(f"left out what follows the rows that its section {section.name} declares")
+    if is_followed:
+        carried.remarks.append("left out what follows its End")
     remarks = () if ends else ("it has no End after its sections; check that none is missing",)
     return cells.soup(np.concatenate(points), remarks, carried)
 
@@ -113,7 +115,7 @@ def _carried(
             place = whole(table(sections["NormalAtVertices"], 0, 2).integers) - 1
             values = np.full((len(of_points), 3), np.nan)
             rows = np.pad(normals, ((0, 0), (0, SPACE - dimension)))
-            values[_within(place[:, 0], len(values))] = rows[_within(place[:, 1], len(normals))]
+            values[_within(place[:, 0], len(values), "Vertices")] = rows[_within(place[:, 1], len(normals), "Normals")]
             if len(place):
                 carried.point_data[NORMAL] = values
             if (missing := np.count_nonzero(np.isnan(values).all(axis=1))) and len(place):
@@ -131,21 +133,23 @@ def _take_edges(sections: dict[str, Section], carried: Carried) -> None:
     if "Edges" not in sections:
         for name in _MARKED_EDGES:
             with carried.optional(f"the section {name}"):
-                _within(marks(sections[name]) if name in sections else np.zeros(0, dtype=np.int64), 0)
+                _within(marks(sections[name]) if name in sections else np.zeros(0, dtype=np.int64), 0, "Edges")
         return
     rows = whole(table(sections["Edges"], 0, 3).integers)
     chosen = rows[:, 2] != 0
     for name in _MARKED_EDGES:
         with carried.optional(f"the section {name}"):
             if name in sections:
-                chosen[_within(marks(sections[name]), len(rows))] = True
+                chosen[_within(marks(sections[name]), len(rows), "Edges")] = True
     carried.lines.add(rows[chosen, :2] - 1, np.flatnonzero(chosen))
     carried.lines.divide(REFERENCE, rows[:, 2])
 
 
-def _within(numbers: Integers, count: int) -> Integers:
-    """Return numbers from 0; ValueError if one is too large or negative."""
+def _within(numbers: Integers, count: int, section: str) -> Integers:
+    """Return numbers of rows of a section, from 0; ValueError if one is too large or negative."""
     outside = numbers[(numbers < 0) | (numbers >= count)]
     if len(outside):
-        raise ValueError(f"it refers to number {outside[0] + 1} of {count}" if count else "the file has none of these")
+        raise ValueError(
+            f"it refers to number {outside[0] + 1} of {count} {section}" if count else f"it has no {section}"
+        )
     return numbers

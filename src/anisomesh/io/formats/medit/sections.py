@@ -15,7 +15,7 @@ import numpy.typing as npt
 
 from anisomesh.io.carried import Integers
 from anisomesh.io.formats.medit.keywords import END, KEYWORDS
-from anisomesh.io.formats.words import parsed_integers, parsed_reals, text_of, whole
+from anisomesh.io.formats.words import parsed_integers, parsed_reals, text_of, whole, without_end_marks
 
 PLANE, SPACE = 2, 3
 """Dimensions of files: numbers of coordinates of points."""
@@ -55,11 +55,12 @@ class Section(Protocol):
 
 
 class Sections(NamedTuple):
-    """A file: the number of coordinates of points, its sections in order, and whether it has an end."""
+    """A file: the number of coordinates of points, its sections in order, whether it has an end, and text behind it."""
 
     dimension: int
     sections: list[Section]
     ends: bool
+    is_followed: bool
 
     def named(self, name: str) -> Section | None:
         """Return the last section of a name."""
@@ -87,14 +88,17 @@ def read_sections(data: bytes) -> Sections:
     """
     cookie = {b"\x01\x00\x00\x00": "<", b"\x00\x00\x00\x01": ">"}.get(data[:4])
     found = list(_text_sections(data) if cookie is None else _binary_sections(data, "<" if cookie == "<" else ">"))
-    ends = bool(found) and found[-1].name == END
+    end = next((k for k, section in enumerate(found) if section.name == END), len(found))
+    ends = end < len(found)
+    is_followed = cookie is None and ends and (end + 1 < len(found) or found[end].n_left > 0)
+    found = found[:end]
     dimension = SPACE
     for section in found:
         if section.name == "Dimension" and section.n_left:
             dimension = section.types(1)[0]
             if dimension not in (PLANE, SPACE):
                 raise ValueError(f"its dimension is {dimension}; expected {PLANE} or {SPACE}")
-    return Sections(dimension, [section for section in found if section.name not in ("Dimension", END)], ends)
+    return Sections(dimension, [section for section in found if section.name != "Dimension"], ends, is_followed)
 
 
 class _Text:
@@ -159,7 +163,7 @@ class _Text:
 
 
 def _text_sections(data: bytes) -> Iterator[Section]:
-    words = re.sub(rb"#[^\r\n]*", b"", data).split()
+    words = re.sub(rb"#[^\r\n]*", b"", without_end_marks(data)).split()
     if not words or not words[0].startswith(b"MeshVersionFormatted"):
         raise ValueError("it does not begin with MeshVersionFormatted as a MEDIT text file does")
     starts = [k for k, word in enumerate(words) if word[:1].isalpha() and word.lower() not in (b"nan", b"inf")]

@@ -11,7 +11,7 @@ from anisomesh.io.cells import SurfaceCells, strip_triangles
 from anisomesh.io.formats.ply.body import BinaryBody, PropertyValues, TextBody
 from anisomesh.io.formats.ply.header import EDGE_REGIONS, NAME, REGIONS, TEXTURE_FILE, Element, read_header
 from anisomesh.io.formats.region_names import also_named, unquoted
-from anisomesh.io.formats.words import whole
+from anisomesh.io.formats.words import whole, without_end_marks
 from anisomesh.io.polygons import PolygonSoup
 
 _INDEX_PROPERTIES = ("vertex_indices", "vertex_index")  # both are in use for the corners of a face
@@ -49,7 +49,9 @@ def read_ply(data: bytes) -> PolygonSoup:
     if not any(element.name == "vertex" for element in header.elements):
         raise ValueError("the header declares no vertex element")
     body = (
-        TextBody(data[header.start :].split()) if header.order == "" else BinaryBody(data, header.start, header.order)
+        TextBody(without_end_marks(data[header.start :]).split())
+        if header.order == ""
+        else BinaryBody(data, header.start, header.order)
     )
     points, cells, carried = np.zeros((0, 3)), SurfaceCells(), Carried()
     for element in header.elements:
