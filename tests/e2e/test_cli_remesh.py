@@ -7,6 +7,9 @@ import numpy as np
 import pytest
 import trimesh
 
+from anisomesh import save
+from anisomesh.shapes.analytic import box
+
 REPORT_KEYS = {
     "vertices_asked",
     "vertices",
@@ -111,6 +114,17 @@ def test_summary_names_size_and_files(run_cli, torus_obj, tmp_path):
     count = len(read(tmp_path / "out.obj").vertices)
     assert f"{count:,} (asked for 200)" in process.stdout
     assert "out.obj" in process.stdout
+
+
+@pytest.mark.parametrize("words", [["-n", 6], ["-n", 6, "-n", 5]])
+def test_a_quiet_remesh_still_warns_of_the_result(run_cli, tmp_path, words):
+    """Regression: the warnings were a part of the summary, and lost with it."""
+    save(box(n=2), tmp_path / "box.obj")
+    process = run_cli("remesh", "box.obj", "-o", "out.glb", *words, "--no-fit", "-q", cwd=tmp_path)
+    assert (process.returncode, process.stdout) == (0, "")
+    lines = process.stderr.splitlines()
+    assert any("of 8 corners have no vertex; ask for more vertices" in line for line in lines)
+    assert all(line.startswith("anisomesh: warning: ") for line in lines)
 
 
 def test_the_output_may_replace_the_input(run_cli, torus_obj, tmp_path):

@@ -238,7 +238,7 @@ Ratio = Annotated[
 InputFormat = Annotated[
     str | None, typer.Option(metavar="FORMAT", help="Format of IN, if its suffix does not name it: ply, obj, ...")
 ]
-Quiet = Annotated[bool, typer.Option("--quiet", "-q", help="No progress and no summary.")]
+Quiet = Annotated[bool, typer.Option("--quiet", "-q", help="No progress and no summary, only warnings.")]
 Workers = Annotated[
     int | None,
     typer.Option(

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import logging
 import sys
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterable, Iterator
 from contextlib import contextmanager
 from functools import wraps
 from inspect import Parameter, Signature, signature
@@ -13,6 +13,8 @@ from typing import Annotated, Any
 import typer
 
 from anisomesh.cli.spelling import in_one_line
+
+logger = logging.getLogger(__name__)
 
 _LEVELS = (logging.WARNING, logging.INFO, logging.DEBUG)  # by the number of -v
 _Verbose = Annotated[
@@ -40,6 +42,13 @@ class _Lines(logging.Handler):
         print(line, file=sys.stderr, flush=True)
 
 
+def log_warnings(rows: Iterable[tuple[str, str]]) -> None:
+    """Log the warnings among the rows of a table that is not printed."""
+    for name, text in rows:
+        if name == "warning":
+            logger.warning("%s", text)
+
+
 @contextmanager
 def log_on_stderr(verbosity: int) -> Iterator[None]:
     """Print what the package logs, and nobody else does, on standard error.
@@ -49,17 +58,17 @@ def log_on_stderr(verbosity: int) -> Iterator[None]:
     verbosity
         0 for warnings, 1 for information too, 2 for everything.
     """
-    logger, lines = logging.getLogger("anisomesh"), _Lines()
-    level, propagate = logger.level, logger.propagate
-    logger.setLevel(_LEVELS[min(verbosity, len(_LEVELS) - 1)])
-    logger.propagate = False  # a library may have set up another handler, and lines would appear twice
-    logger.addHandler(lines)
+    package, lines = logging.getLogger("anisomesh"), _Lines()
+    level, propagate = package.level, package.propagate
+    package.setLevel(_LEVELS[min(verbosity, len(_LEVELS) - 1)])
+    package.propagate = False  # a library may have set up another handler, and lines would appear twice
+    package.addHandler(lines)
     try:
         yield
     finally:
-        logger.removeHandler(lines)
-        logger.setLevel(level)
-        logger.propagate = propagate
+        package.removeHandler(lines)
+        package.setLevel(level)
+        package.propagate = propagate
 
 
 def logs(command: Callable[..., None]) -> Callable[..., None]:

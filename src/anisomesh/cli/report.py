@@ -90,11 +90,19 @@ def summary(report: dict[str, Any], written: Sequence[Path], notes: Sequence[str
         ("optimiser", f"{counted(report['iterations'], 'iteration')}{energy}: {report['status']}"),
         ("seconds", f"{seconds['total']:.2f} ({stages})"),
         *(("prepared", note) for note in notes),
-        *warning_rows(report["warnings"]),
+        *warnings_in(report),
         *(("hint", text) for text in report.get("hints", [])),
         *(("wrote", str(path)) for path in written),
     ]
     return table(rows)
+
+
+def warnings_in(report: dict[str, Any]) -> list[tuple[str, str]]:
+    """Return the rows of a table with the warnings in the report of a remesh, or of each level of detail."""
+    levels = report.get("levels")
+    if levels is None:
+        return warning_rows(report["warnings"])
+    return warning_rows(f"level {k}: {text}" for k, level in enumerate(levels) for text in level["warnings"])
 
 
 def _describe_embedding(name: str, options: dict[str, Any]) -> str:

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Annotated, Literal, get_args
 import typer
 
 from anisomesh.cli.job import check_output_path, check_picture_path, refuse_to_overwrite
+from anisomesh.cli.log import log_warnings
 from anisomesh.cli.report import counted, table
 
 if TYPE_CHECKING:
@@ -64,6 +65,8 @@ def size(surface: Surface) -> str:
 
 
 def conclude(rows: Sequence[tuple[str, str]], out: Path, quiet: bool) -> None:
-    """Print what was drawn and the file it was written to, unless quiet."""
-    if not quiet:
+    """Print what was drawn and the file it was written to, only warnings if quiet."""
+    if quiet:
+        log_warnings(rows)
+    else:
         typer.echo(table([*rows, ("wrote", str(out))]))

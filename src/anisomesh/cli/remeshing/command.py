@@ -28,6 +28,7 @@ from anisomesh.cli.job import (
     read_mesh,
     run_remesh,
 )
+from anisomesh.cli.log import log_warnings
 from anisomesh.cli.progress import progress
 from anisomesh.cli.remeshing.levels import LevelOutputs, levels_summary, run_levels, targets_of
 from anisomesh.cli.remeshing.prescribed_metric import (
@@ -46,7 +47,7 @@ from anisomesh.cli.remeshing.shared_options import (
     NormOfAdaption,
     Ratios,
 )
-from anisomesh.cli.report import as_json, hints, summary
+from anisomesh.cli.report import as_json, hints, summary, warnings_in
 
 if TYPE_CHECKING:
     from anisomesh.mesh.surface import Surface
@@ -224,7 +225,9 @@ def command(
         outputs.write(result, facts, display)
     if json_:
         typer.echo(as_json(facts))
-    elif not quiet:
+    elif quiet:
+        log_warnings(warnings_in(facts))
+    else:
         text = levels_summary if n_levels else summary
         typer.echo(text(facts, outputs.paths, first.prepare_report.lines()), err=to_stdout)
 

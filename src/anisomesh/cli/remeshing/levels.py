@@ -11,7 +11,7 @@ import typer
 from anisomesh.cli.job import STANDARD_STREAM, Outputs, check_format, check_not_there, check_output_path
 from anisomesh.cli.progress import Display, announce_remesh
 from anisomesh.cli.ratios import shares
-from anisomesh.cli.report import table, write_json
+from anisomesh.cli.report import table, warnings_in, write_json
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -166,7 +166,7 @@ def levels_summary(report: dict[str, Any], written: Sequence[Path], notes: Seque
         ("G, RMS, HD", "mean quality; distances from the input over its bounding-box diagonal"),
         ("seconds", f"{report['seconds']:.2f}"),
         *(("prepared", note) for note in notes),
-        *(("warning", f"level {k}: {text}") for k, level in enumerate(levels) for text in level["warnings"]),
+        *warnings_in(report),
         *(("hint", text) for text in report.get("hints", [])),
         *(("wrote", str(path)) for path in written),
     ]
