@@ -6,6 +6,7 @@ from junction_shapes import square
 
 from anisomesh.conforming.chains import Bundle, Chain, conform
 from anisomesh.mesh.boundary_places import boundary_places
+from anisomesh.mesh.closed_polyline import placed_on
 from anisomesh.mesh.surface import Surface
 from anisomesh.mesh.topology import boundary_loops, euler_characteristic
 
@@ -137,6 +138,23 @@ def test_a_small_loop_of_a_face_that_is_turned_is_placed_in_order():
     assert sorted(found.points.tolist()) == [0, 1, 2]
     assert (np.diff(found.places) > 0.0).all()
     assert 0.0 <= found.places[0] < found.places[-1] < 4.0
+
+
+def test_points_at_one_place_before_and_after_a_turn_are_placed_in_order():
+    """Regression: the places of the ones before the turn were rounded, some to above the others."""
+    rng = np.random.default_rng(3)
+    for _ in range(60):
+        corners = rng.random((7, 3))
+        corners = np.concatenate([corners, corners[:1]])
+        start = np.concatenate([[0.0], np.cumsum(np.linalg.norm(np.diff(corners, axis=0), axis=1))])
+        total = start[-1]
+        places = np.sort(rng.random(8)) * total
+        places = np.concatenate([places[:1], places, places[:1] + total])  # the first place three times
+        points = np.stack([np.interp(places, start, axis, period=total) for axis in corners.T], axis=1)
+        sides = np.mod(0.5 * (places + np.append(places[1:], places[0] + total)), total)
+        found = placed_on(points, sides, corners)
+        assert found is not None
+        assert (np.diff(found[1]) >= 0.0).all()
 
 
 def test_vertices_at_one_place_are_spaced_evenly():

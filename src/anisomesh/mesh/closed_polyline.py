@@ -49,7 +49,7 @@ def _from_start(placed: Floats, total: float) -> tuple[int, Floats]:
     """Return which of some ascending arc lengths (n,) around a loop is the first behind its start, and all from it."""
     turn = np.floor(placed / total)
     first = int(np.argmax(turn > turn[0])) if turn[-1] > turn[0] else 0
-    return first, np.roll(placed - turn * total, -first)
+    return first, np.maximum.accumulate(np.roll(placed - turn * total, -first))  # equal ones may be rounded apart
 
 
 def placed_by_length(points: Floats, corners: Floats, reach: float) -> tuple[int, Floats] | None:
