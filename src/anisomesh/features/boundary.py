@@ -32,7 +32,7 @@ class BoundaryLoops(FeaturePolylines):
         cosine = np.divide(-(back * ahead).sum(axis=1), lengths, out=np.ones_like(lengths), where=lengths > 0.0)
         return np.asarray(np.degrees(np.arccos(np.clip(cosine, -1.0, 1.0))))
 
-    def corners(self, reach: float, sharp_ends: Ints) -> tuple[Ints, Floats]:
+    def corners(self, reach: float, sharp_ends: Ints, kept: Ints | None = None) -> tuple[Ints, Floats]:
         """Return the segments (n,) that start at a corner, and the turning angles there (n,) in degrees.
 
         Parameters
@@ -41,11 +41,14 @@ class BoundaryLoops(FeaturePolylines):
             Arc length over which turns are measured. Of several corners within it only the sharpest is kept, unless
             the others are as sharp when measured over an eighth of it.
         sharp_ends
-            Points of the surface where a crease meets the boundary, or a vertex is wanted: always corners.
+            Points of the surface where a crease meets the boundary, or a vertex is wanted: as sharp as can be.
+        kept
+            Points of these that are as sharp over an eighth of the reach, so that sharper ones near them do not count.
         """
         turn, fine = self.turns(reach), self.turns(_FINE_SCALE * reach)
-        always = np.isin(self.tail, sharp_ends)
-        turn[always] = 180.0
+        turn[np.isin(self.tail, sharp_ends)] = 180.0
+        if kept is not None:
+            fine[np.isin(self.tail, kept)] = 180.0
         candidate = np.flatnonzero(turn > CORNER_TURN)
         low, high = self.limits[self.polyline[candidate]].T
         near = np.minimum(reach, _MAX_TURN_SCALE * (high - low)) * np.where(
@@ -59,7 +62,7 @@ class BoundaryLoops(FeaturePolylines):
             chosen.append(int(candidate[k]))
             apart = np.abs(self.start[candidate] - self.start[candidate[k]])
             apart = np.minimum(apart, (high - low) - apart)
-            taken |= (self.polyline[candidate] == self.polyline[candidate[k]]) & (apart < near) & ~always[candidate]
+            taken |= (self.polyline[candidate] == self.polyline[candidate[k]]) & (apart < near)
         segments = np.array(sorted(chosen), dtype=np.int64)
         return segments, turn[segments]
 

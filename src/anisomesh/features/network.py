@@ -108,7 +108,8 @@ def trace_features(
     if apexes is None:
         apexes = np.zeros(0, dtype=np.int64)
     always = np.union1d(surface.edges[sharp], apexes).astype(np.int64)
-    corners, turns = boundary.corners(_CORNER_SCALE * spacing, always)
+    prescribed = surface.edges[required & (surface.edge_face_count > 1)]  # so that they are followed to the boundary
+    corners, turns = boundary.corners(_CORNER_SCALE * spacing, always, kept=prescribed.astype(np.int64))
     creases = select_creases(
         positions, surface, sharp, required=required, spacing=spacing, max_length=_MAX_CREASE_LENGTH * n_sites
     )
